@@ -1,0 +1,30 @@
+"""The replay certificate: one hash over every estimate and fate of a run, so that two replays can be compared."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from collections.abc import Iterable
+
+from fusion.track import Update
+
+
+def _numbers(*values: float | None) -> bytes:
+    """Floats as little-endian doubles; None as a byte of its own, so that it differs from any number."""
+    return b"".join(b"\0" if value is None else b"\1" + struct.pack("<d", value) for value in values)
+
+
+def digest(updates: Iterable[Update]) -> str:
+    """SHA-256 of every estimate and fate of ``updates``, in order, as hexadecimal text."""
+    total = hashlib.sha256()
+    for update in updates:
+        estimate = update.estimate
+        total.update(
+            struct.pack("<q??q", estimate.time_ns, estimate.valid, estimate.heading_known, estimate.reset_count)
+        )
+        total.update(_numbers(*estimate.pose, *(estimate.covariance or (None,)), estimate.p_lost))
+        for fate in update.fates:
+            text = f"{fate.time_ns} {fate.sensor} {fate.seq} {fate.anchor} {fate.decision.value} {fate.reason.value}"
+            total.update(text.encode())
+            total.update(_numbers(fate.weight, fate.innovation, fate.innovation_variance, fate.nis))
+    return total.hexdigest()

@@ -1,0 +1,98 @@
+"""The command line: one word, verbs under it. A verb's module is imported when the verb is used.
+
+Each module has ``configure(parser)`` and ``run(arguments) -> exit code``; what it does is also one function with
+keyword arguments. Exit codes: 0 done, 1 a known error told in one sentence, 2 wrong usage, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any, NamedTuple, NoReturn
+
+from fusion.errors import FusionError, did_you_mean
+
+
+class Verb(NamedTuple):
+    """Where a verb lives and what it does, in one line."""
+
+    module: str
+    summary: str
+
+
+VERBS = {
+    "demo": Verb("benchmarks.demo", "the whole promise in one command: simulate, record, score, show"),
+    "simulate": Verb("sensors.simulate", "drive a simulated robot and record it as an MCAP log"),
+    "import": Verb("logs.importing", "turn a recording of another format into an MCAP log"),
+    "export": Verb("logs.export", "turn a log into CSV or TUM files"),
+    "info": Verb("logs.info", "what is in a log"),
+    "bench": Verb("benchmarks.bench", "score estimators on recorded runs"),
+    "replay": Verb("benchmarks.replay", "run one estimator over a log and record what it said"),
+    "review": Verb("benchmarks.review", "see a run and its estimators in Rerun"),
+    "estimators": Verb("fusion.listing", "what estimators are installed, and their parameters"),
+    "check": Verb("fusion.check", "hold an estimator against the contract"),
+}
+
+
+class _Parser(argparse.ArgumentParser):
+    """An argument parser that answers unknown verbs with the nearest one."""
+
+    def error(self, message: str) -> NoReturn:
+        self.print_usage(sys.stderr)
+        self.exit(2, f"{self.prog}: {message}\n")
+
+
+def _verb_parser(name: str, module: Any) -> argparse.ArgumentParser:  # noqa: ANN401 - a module
+    parser = _Parser(prog=f"fusion {name}", description=VERBS[name].summary)
+    module.configure(parser)
+    return parser
+
+
+def _usage() -> str:
+    width = max(map(len, VERBS))
+    rows = "\n".join(f"  {name:<{width}}  {verb.summary}" for name, verb in VERBS.items())
+    return (
+        "usage: fusion VERB ...\n\nWhich filter should run on my robot, and can I trust it?\n\n"
+        f"{rows}\n\n`fusion VERB --help` tells more of each; `fusion demo` is the place to start.\n"
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command line; answers its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if not words or words[0] in ("-h", "--help"):
+        sys.stdout.write(_usage())
+        return 0 if words else 2
+    if words[0] == "--version":
+        from fusion import __version__
+
+        sys.stdout.write(f"fusion {__version__}\n")
+        return 0
+    if words[0] not in VERBS:
+        sys.stderr.write(f"fusion: there is no verb {words[0]!r}; {did_you_mean(words[0], VERBS)}\n")
+        return 2
+    return _run(words[0], words[1:])
+
+
+def _run(verb: str, words: Sequence[str]) -> int:
+    module = importlib.import_module(VERBS[verb].module)
+    parsed = _verb_parser(verb, module).parse_args(words)
+    try:
+        return int(module.run(parsed))
+    except FusionError as error:
+        sys.stderr.write(f"fusion {verb}: {error}\n")
+        return 1
+    except KeyboardInterrupt:
+        sys.stderr.write(f"fusion {verb}: interrupted\n")
+        return 130
+    except BrokenPipeError:
+        # The reader of our output went away (`fusion info RUN | head`): nothing is wrong here.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,193 @@
+"""From wheel ticks, motor commands and gyro to odometry increments, once for every estimator.
+
+The host folds every measurement through `Odometer.advance`. Estimators therefore meet one kind of motion,
+`Odometry`, and it always reaches up to the radio reading that follows it: where a reading falls between two odometry
+messages, the last twist is held up to it, and the part held is taken off when the real increment arrives, so motion
+counts exactly once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fusion.geometry import wrap_angle
+from fusion.values import Gyro, Measurement, MotorCommand, Odometry, WheelTicks, nanoseconds, seconds
+from fusion.world import Robot
+
+MAX_HOLD_NS = nanoseconds(0.5)
+"""Longest time a twist is held without new odometry, unless odometry itself comes more slowly."""
+MAX_GYRO_AGE_NS = nanoseconds(0.2)
+"""Oldest gyro sample that still gives the turn; beyond it the wheels do."""
+MAX_WHEEL_SPEED_M_S = 10.0
+"""Faster than this between two messages, the encoder counter was reset: the increment is dropped."""
+
+
+class LinearDistance(NamedTuple):
+    """True distance as a straight line over the measured one: the paper's odometry model (section II-B, Fig. 3)."""
+
+    scale: float = 1.0
+    offset_m: float = 0.0
+
+    @classmethod
+    def fit(cls, measured_m: Sequence[float], true_m: Sequence[float]) -> LinearDistance:
+        """Least squares over whole moves [m].
+
+        >>> LinearDistance.fit([1.0, 2.0, 3.0], [1.15, 2.25, 3.35])._asdict()
+        {'scale': 1.1, 'offset_m': 0.05}
+        """
+        scale, offset_m = np.polyfit(measured_m, true_m, 1)
+        return cls(round(float(scale), 12), round(float(offset_m), 12))
+
+    def true_distance(self, measured_m: float) -> float:
+        """True length [m] of one whole move, its sign kept; no move stays no move."""
+        if measured_m == 0.0:
+            return 0.0
+        return self.scale * measured_m + (self.offset_m if measured_m > 0.0 else -self.offset_m)
+
+
+def wheel_increment(robot: Robot, rolled_m: Sequence[float]) -> tuple[float, float]:
+    """Path length [m] and turn [rad] from the distance each wheel rolled [m], in the wheel order of `World`.
+
+    Both sides are averaged; four skid-steered wheels act as two at the effective track width
+    (Borenstein et al. 1997, section 1.2).
+    """
+    left = sum(rolled_m[0::2]) / len(rolled_m[0::2])
+    right = sum(rolled_m[1::2]) / len(rolled_m[1::2])
+    return 0.5 * (left + right), (right - left) / robot.track_width_m
+
+
+class _GyroAngle(NamedTuple):
+    """The gyro's integral: angle [rad] at a time, and the rate then [rad/s]."""
+
+    time_ns: int
+    angle: float
+    rate: float
+
+    def at(self, time_ns: int) -> float:
+        return self.angle + self.rate * seconds(time_ns - self.time_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class OdometerState:
+    """What the odometer remembers. ``covered_ns``: motion is accounted for up to here."""
+
+    covered_ns: int
+    last_ns: int
+    span_ns: int = 0
+    speed_m_s: float = 0.0
+    turn_rate_rad_s: float = 0.0
+    held_distance_m: float = 0.0
+    held_turn_rad: float = 0.0
+    counts: tuple[int, ...] | None = None
+    forward: tuple[int, ...] | None = None
+    moving: bool = False
+    gyro: _GyroAngle | None = None
+    gyro_angle_at_last: float = 0.0
+
+
+class Odometer:
+    """Turns one robot's motion measurements into `Odometry`. Holds the robot only; the state is a value."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._distance = LinearDistance(robot.distance_scale, robot.distance_offset_m)
+
+    def start(self, time_ns: int) -> OdometerState:
+        """Motion is accounted for from ``time_ns`` on."""
+        return OdometerState(covered_ns=time_ns, last_ns=time_ns)
+
+    def advance(self, state: OdometerState, measurement: Measurement) -> tuple[OdometerState, tuple[Measurement, ...]]:
+        """The measurements an estimator should see in place of ``measurement``, in order."""
+        if isinstance(measurement, Odometry):
+            return self._real(state, measurement)
+        if isinstance(measurement, WheelTicks):
+            return self._ticks(state, measurement)
+        if isinstance(measurement, MotorCommand):
+            forward = tuple(-1 if speed < 0.0 else 1 for speed in measurement.wheel_speeds_m_s)
+            return replace(state, forward=forward), ()
+        if isinstance(measurement, Gyro):
+            return self._gyro(state, measurement)
+        state, motion = self.hold(state, measurement.time_ns)
+        return state, (*motion, measurement)
+
+    def hold(self, state: OdometerState, time_ns: int) -> tuple[OdometerState, tuple[Odometry, ...]]:
+        """Motion up to ``time_ns`` on the last twist known; past the longest hold, unmeasured motion."""
+        if time_ns <= state.covered_ns:
+            return state, ()
+        limit_ns = state.last_ns + max(MAX_HOLD_NS, state.span_ns * 3 // 2) if state.span_ns else state.covered_ns
+        motion: list[Odometry] = []
+        for until_ns, measured in ((min(time_ns, limit_ns), True), (time_ns, False)):
+            if until_ns > state.covered_ns:
+                duration_s = seconds(until_ns - state.covered_ns) if measured else 0.0
+                distance, turn = state.speed_m_s * duration_s, state.turn_rate_rad_s * duration_s
+                motion.append(Odometry(until_ns, "held", 0, state.covered_ns, distance, turn, measured))
+                state = replace(
+                    state,
+                    covered_ns=until_ns,
+                    held_distance_m=state.held_distance_m + distance,
+                    held_turn_rad=state.held_turn_rad + turn,
+                )
+        return state, tuple(motion)
+
+    def _real(self, state: OdometerState, odometry: Odometry) -> tuple[OdometerState, tuple[Odometry, ...]]:
+        """A measured increment: what was held already is taken off."""
+        turn = odometry.turn_rad
+        angle = state.gyro_angle_at_last
+        if self.robot.turn_source == "gyro" and state.gyro is not None:
+            angle = state.gyro.at(odometry.time_ns)
+            if odometry.time_ns - state.gyro.time_ns <= MAX_GYRO_AGE_NS:
+                turn = angle - state.gyro_angle_at_last
+        span_ns = odometry.time_ns - odometry.from_ns
+        remaining = replace(
+            odometry,
+            from_ns=min(state.covered_ns, odometry.time_ns),
+            distance_m=odometry.distance_m - state.held_distance_m,
+            turn_rad=turn - state.held_turn_rad,
+        )
+        span_s = max(seconds(span_ns), 1e-9)
+        return replace(
+            state,
+            covered_ns=max(state.covered_ns, odometry.time_ns),
+            last_ns=odometry.time_ns,
+            span_ns=span_ns,
+            speed_m_s=odometry.distance_m / span_s,
+            turn_rate_rad_s=turn / span_s,
+            held_distance_m=0.0,
+            held_turn_rad=0.0,
+            gyro_angle_at_last=angle,
+        ), (remaining,)
+
+    def _ticks(self, state: OdometerState, ticks: WheelTicks) -> tuple[OdometerState, tuple[Odometry, ...]]:
+        before, counted = state.counts, replace(state, counts=ticks.counts)
+        if before is None or len(before) != len(ticks.counts):
+            angle = state.gyro.at(ticks.time_ns) if state.gyro else 0.0
+            return replace(counted, last_ns=ticks.time_ns, gyro_angle_at_last=angle), ()
+        signs = state.forward if self.robot.encoder == "single_channel" and state.forward else (1,) * len(before)
+        per_tick = self.robot.distance_per_tick_m
+        rolled = [sign * per_tick * (now - then) for sign, now, then in zip(signs, ticks.counts, before, strict=True)]
+        span_ns = ticks.time_ns - state.last_ns
+        if max(map(abs, rolled)) > MAX_WHEEL_SPEED_M_S * max(seconds(span_ns), 0.1):
+            return counted, ()
+        distance, turn = wheel_increment(self.robot, rolled)
+        distance *= self._distance.scale
+        if distance and not state.moving:
+            distance += self._distance.offset_m if distance > 0.0 else -self._distance.offset_m
+        counted = replace(counted, moving=bool(distance))
+        return self._real(
+            counted, Odometry(ticks.time_ns, ticks.sensor, ticks.seq, state.last_ns, distance, wrap_angle(turn))
+        )
+
+    def _gyro(self, state: OdometerState, gyro: Gyro) -> tuple[OdometerState, tuple[Measurement, ...]]:
+        if self.robot.turn_source != "gyro":
+            return state, (gyro,)
+        rate, before = gyro.rate_rad_s - self.robot.gyro_bias_rad_s, state.gyro
+        if before is None:
+            first = _GyroAngle(gyro.time_ns, 0.0, rate)
+            return replace(state, gyro=first, gyro_angle_at_last=first.at(state.last_ns)), ()
+        mean_rate = 0.5 * (before.rate + rate)
+        angle = before.angle + mean_rate * seconds(gyro.time_ns - before.time_ns)
+        return replace(state, gyro=_GyroAngle(gyro.time_ns, angle, rate)), ()

@@ -1,0 +1,135 @@
+"""What a radio reading says about distance, both ways.
+
+Signal strength follows the close-in free-space reference path-loss model (Moro & Mehrpouyan 2019, eqs. 3 and 4;
+Rappaport et al. 2015):
+
+    PL(d) = PL(d0) + 10 n log10(d / d0) + X_sigma    for d >= d0        PL(d0) = 20 log10(4 pi d0 / lambda)
+
+Below the reference distance d0 the model says nothing. Here the loss is held at PL(d0), so the expected RSSI is
+constant, its slope zero, and the inverse never answers less than d0.
+
+Ranges follow a line: measured = scale * distance + offset. Functions take floats or arrays of any one shape.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+SPEED_OF_LIGHT_M_S = 299_792_458.0
+
+Array = NDArray[np.float64]
+
+
+def free_space_loss_db(distance_m: float, frequency_hz: float) -> float:
+    """Free-space path loss 20 log10(4 pi d / lambda) [dB] (eq. 4; Friis 1946)."""
+    wavelength_m = SPEED_OF_LIGHT_M_S / frequency_hz
+    return 20.0 * math.log10(4.0 * math.pi * distance_m / wavelength_m)
+
+
+class DistanceModel(Protocol):
+    """How one anchor's reading depends on the distance between the two antennas."""
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of one reading, in the reading's unit."""
+
+    @property
+    def bias_std(self) -> float:
+        """How far all readings of one anchor may be off together, one standard deviation, in the reading's unit."""
+
+    def expected(self, distance_m: ArrayLike) -> Array:
+        """The reading expected at ``distance_m``."""
+
+    def slope(self, distance_m: ArrayLike) -> Array:
+        """Derivative of ``expected`` [reading's unit / m]."""
+
+    def distance(self, reading: ArrayLike) -> Array:
+        """The distance [m] at which ``reading`` is expected."""
+
+
+@dataclass(frozen=True, slots=True)
+class PathLoss:
+    """Signal strength of one anchor (eq. 3). ``reference_rssi_dbm`` is the RSSI measured at the reference distance;
+    None: computed as transmit power + antenna gains - free-space loss (eq. 4).
+    """
+
+    frequency_hz: float = 2.437e9
+    path_loss_exponent: float = 2.0
+    reference_distance_m: float = 1.0
+    transmit_power_dbm: float = 20.0
+    transmit_gain_dbi: float = 0.0
+    receive_gain_dbi: float = 0.0
+    reference_rssi_dbm: float | None = None
+    shadowing_std_db: float = 4.0
+    bias_std_db: float = 0.0
+
+    @property
+    def rssi_at_reference_dbm(self) -> float:
+        """RSSI expected at the reference distance [dBm]."""
+        if self.reference_rssi_dbm is not None:
+            return self.reference_rssi_dbm
+        gains_dbi = self.transmit_gain_dbi + self.receive_gain_dbi
+        return self.transmit_power_dbm + gains_dbi - free_space_loss_db(self.reference_distance_m, self.frequency_hz)
+
+    @property
+    def std(self) -> float:
+        """Shadowing [dB]."""
+        return self.shadowing_std_db
+
+    @property
+    def bias_std(self) -> float:
+        """Common error of all readings of the anchor [dB]."""
+        return self.bias_std_db
+
+    def expected(self, distance_m: ArrayLike) -> Array:
+        """RSSI [dBm] expected at ``distance_m``; constant below the reference distance."""
+        decades = np.log10(np.maximum(distance_m, self.reference_distance_m) / self.reference_distance_m)
+        return np.asarray(self.rssi_at_reference_dbm - 10.0 * self.path_loss_exponent * decades)
+
+    def slope(self, distance_m: ArrayLike) -> Array:
+        """dRSSI/dd [dB/m]: -10 n / (d ln 10), zero below the reference distance."""
+        beyond = np.asarray(distance_m) >= self.reference_distance_m
+        steepness = -10.0 * self.path_loss_exponent / math.log(10.0)
+        return np.where(beyond, steepness / np.maximum(distance_m, self.reference_distance_m), 0.0)
+
+    def distance(self, reading: ArrayLike) -> Array:
+        """Distance [m] from RSSI [dBm], the inverse of eq. 3; never less than the reference distance."""
+        exponent = (self.rssi_at_reference_dbm - np.asarray(reading)) / (10.0 * self.path_loss_exponent)
+        return np.asarray(self.reference_distance_m * np.power(10.0, np.maximum(exponent, 0.0)))
+
+
+@dataclass(frozen=True, slots=True)
+class Ranging:
+    """Measured ranges of one anchor: measured = scale * distance + offset + noise."""
+
+    scale: float = 1.0
+    offset_m: float = 0.0
+    std_m: float = 0.15
+    bias_std_m: float = 0.0
+
+    @property
+    def std(self) -> float:
+        """Noise [m]."""
+        return self.std_m
+
+    @property
+    def bias_std(self) -> float:
+        """Common error of all ranges of the anchor [m]."""
+        return self.bias_std_m
+
+    def expected(self, distance_m: ArrayLike) -> Array:
+        """Range [m] expected at ``distance_m``."""
+        return np.asarray(self.scale * np.asarray(distance_m) + self.offset_m)
+
+    def slope(self, distance_m: ArrayLike) -> Array:
+        """The scale, whatever the distance."""
+        return np.full_like(distance_m, self.scale, dtype=np.float64)
+
+    def distance(self, reading: ArrayLike) -> Array:
+        """Distance [m] behind a measured range; never less than zero."""
+        return np.asarray(np.maximum((np.asarray(reading) - self.offset_m) / self.scale, 0.0))

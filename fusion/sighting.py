@@ -1,0 +1,73 @@
+"""Radio readings as every filter wants them: one scalar at a time, with what the world expects of it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fusion.radio import DistanceModel
+from fusion.values import Ranges, RssiReading, WifiScan
+from fusion.world import Anchor, World
+
+
+class Expectation(NamedTuple):
+    """The reading expected at a pose, and its derivatives [reading's unit / m, / m, / rad]."""
+
+    value: float
+    by_x: float
+    by_y: float
+    by_heading: float
+
+
+class Sighting(NamedTuple):
+    """One reading of one anchor: value and variance in the reading's unit (dBm and dB^2, or m and m^2)."""
+
+    anchor: Anchor
+    model: DistanceModel
+    value: float
+    variance: float
+
+    def expect(self, x: float, y: float, heading: float, antenna_m: tuple[float, float, float]) -> Expectation:
+        """What the anchor should read with the robot's base at (x, y, heading) and its antenna at ``antenna_m`` on it."""
+        c, s = math.cos(heading), math.sin(heading)
+        arm_x, arm_y = c * antenna_m[0] - s * antenna_m[1], s * antenna_m[0] + c * antenna_m[1]
+        dx, dy, dz = x + arm_x - self.anchor.x, y + arm_y - self.anchor.y, antenna_m[2] - self.anchor.z
+        distance = max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-6)
+        slope = float(self.model.slope(distance)) / distance
+        return Expectation(
+            float(self.model.expected(distance)), slope * dx, slope * dy, slope * (dy * arm_x - dx * arm_y)
+        )
+
+    def expected_values(
+        self,
+        x: NDArray[np.float64],
+        y: NDArray[np.float64],
+        heading: NDArray[np.float64],
+        antenna_m: tuple[float, float, float],
+    ) -> NDArray[np.float64]:
+        """`expect` over many poses at once, without derivatives; all arrays of one shape."""
+        c, s = np.cos(heading), np.sin(heading)
+        dx = x + c * antenna_m[0] - s * antenna_m[1] - self.anchor.x
+        dy = y + s * antenna_m[0] + c * antenna_m[1] - self.anchor.y
+        return self.model.expected(np.sqrt(dx * dx + dy * dy + (antenna_m[2] - self.anchor.z) ** 2))
+
+
+def sightings(world: World, scan: WifiScan | Ranges) -> tuple[Sighting, ...]:
+    """The readings of a screened scan as sightings, in the order of their anchors.
+
+    A range's variance is the larger of the world's and the device's own claim: devices are optimists.
+    """
+    found: list[Sighting] = []
+    for reading in scan.readings:
+        anchor = world.anchor(reading.anchor)
+        if anchor is None:
+            continue
+        if isinstance(reading, RssiReading):
+            found.append(Sighting(anchor, anchor.radio, reading.rssi_dbm, anchor.radio.std**2))
+        else:
+            std = max(anchor.ranging.std, reading.std_m or 0.0)
+            found.append(Sighting(anchor, anchor.ranging, reading.range_m, std**2))
+    return tuple(found)

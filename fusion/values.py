@@ -1,0 +1,205 @@
+"""The values that flow through the house: measurements in, estimates and fates out.
+
+All are small and immutable, in SI units and radians, with time in integer nanoseconds. ``time_ns`` says when a
+measurement was true. ``sensor`` and ``seq`` identify it: the pair is unique within a run at one ``time_ns``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, unique
+from typing import NamedTuple, TypeAlias
+
+from fusion.geometry import Covariance, Pose
+
+NANOSECONDS = 1_000_000_000
+"""Nanoseconds in a second."""
+
+
+def seconds(duration_ns: int) -> float:
+    """A duration in nanoseconds, in seconds."""
+    return duration_ns / NANOSECONDS
+
+
+def nanoseconds(duration_s: float) -> int:
+    """A duration in seconds, in whole nanoseconds."""
+    return round(duration_s * NANOSECONDS)
+
+
+@dataclass(frozen=True, slots=True)
+class WheelTicks:
+    """Cumulative encoder counts, one per wheel in the order of ``World.robot``: a lost message loses no distance."""
+
+    time_ns: int
+    sensor: str
+    seq: int
+    counts: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MotorCommand:
+    """What the motors were told: signed speed of each wheel [m/s]. Gives single-channel encoders their sign."""
+
+    time_ns: int
+    sensor: str
+    seq: int
+    wheel_speeds_m_s: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """An increment of motion over (``from_ns``, ``time_ns``]: path length driven forward [m] and turn [rad], left
+    positive. ``measured`` False: nothing measured the motion of that time, and zero stands for "not known".
+    """
+
+    time_ns: int
+    sensor: str
+    seq: int
+    from_ns: int
+    distance_m: float
+    turn_rad: float
+    measured: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Gyro:
+    """Turn rate about the vertical [rad/s], left positive, raw: the bias is not taken off."""
+
+    time_ns: int
+    sensor: str
+    seq: int
+    rate_rad_s: float
+
+
+class RssiReading(NamedTuple):
+    """One anchor's signal strength [dBm], ``age_ns`` before the scan's own time."""
+
+    anchor: str
+    rssi_dbm: float
+    age_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class WifiScan:
+    """Signal strengths heard in one scan (Wi-Fi or BLE)."""
+
+    time_ns: int
+    sensor: str
+    seq: int
+    readings: tuple[RssiReading, ...]
+
+
+class RangeReading(NamedTuple):
+    """One anchor's measured distance [m]; ``std_m`` as the device claims it, None where it claims nothing."""
+
+    anchor: str
+    range_m: float
+    std_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Ranges:
+    """Distances measured at one time (UWB or Wi-Fi round-trip time)."""
+
+    time_ns: int
+    sensor: str
+    seq: int
+    readings: tuple[RangeReading, ...]
+
+
+Motion: TypeAlias = WheelTicks | MotorCommand | Odometry | Gyro
+Radio: TypeAlias = WifiScan | Ranges
+Measurement: TypeAlias = WheelTicks | MotorCommand | Odometry | Gyro | WifiScan | Ranges
+
+
+class Truth(NamedTuple):
+    """Where the robot really was: a stream of its own that no estimator ever sees. Heading None when not known."""
+
+    time_ns: int
+    x: float
+    y: float
+    heading: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known before the first measurement. What is not known counts as uniform, whatever the number says."""
+
+    time_ns: int
+    pose: Pose
+    covariance: Covariance
+    position_known: bool = True
+    heading_known: bool = True
+
+
+class Estimate(NamedTuple):
+    """Where an estimator says the robot is.
+
+    ``covariance`` is None where the method claims none. ``valid`` False means "do not use this pose".
+    ``p_lost`` is the estimator's own probability that it is lost, None without an opinion. ``reset_count`` rises
+    by one whenever belief is replaced instead of corrected; ``reset_delta`` is the last such jump (dx, dy, dheading).
+    """
+
+    time_ns: int
+    pose: Pose
+    covariance: Covariance | None
+    valid: bool = True
+    heading_known: bool = True
+    p_lost: float | None = None
+    reset_count: int = 0
+    reset_delta: Pose | None = None
+
+
+@unique
+class Decision(Enum):
+    """What became of a reading."""
+
+    USED = "used"
+    DOWNWEIGHTED = "downweighted"
+    REJECTED = "rejected"
+    LATE = "late"
+    UNUSABLE = "unusable"
+
+
+@unique
+class Reason(Enum):
+    """Why; a closed list. The host writes those of the second group."""
+
+    OK = "ok"
+    ROBUST_LOSS = "robust_loss"
+    NLOS_MODE = "nlos_mode"
+    GATE = "gate"
+    OUTLIER = "outlier"
+    TOO_FEW_ANCHORS = "too_few_anchors"
+    COLLINEAR_ANCHORS = "collinear_anchors"
+    KIND_NOT_CONSUMED = "kind_not_consumed"
+
+    UNKNOWN_ANCHOR = "unknown_anchor"
+    NOT_FINITE = "not_finite"
+    OUT_OF_RANGE = "out_of_range"
+    STALE = "stale"
+    TOO_LATE = "too_late"
+    DUPLICATE = "duplicate"
+    BAD_CLOCK = "bad_clock"
+    EXCLUDED_BY_REQUEST = "excluded_by_request"
+
+
+class Fate(NamedTuple):
+    """What became of one reading: one per anchor in a scan, one for every other measurement that is not plain motion.
+
+    ``anchor`` is "" for a measurement without anchors. ``weight`` in [0, 1] is the share of the reading's nominal
+    information that entered the state. ``innovation`` is measurement minus prediction from the belief *before* the
+    whole scan, in the reading's own unit; ``innovation_variance`` its variance; ``nis`` their normalised square, also
+    for refused readings. All three are None where the method has no such prediction.
+    """
+
+    time_ns: int
+    sensor: str
+    seq: int
+    anchor: str
+    decision: Decision
+    reason: Reason
+    weight: float
+    innovation: float | None = None
+    innovation_variance: float | None = None
+    nis: float | None = None

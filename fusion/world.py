@@ -1,0 +1,245 @@
+"""The world a run happens in: anchors and their radio, the robot, the floor. A TOML file on disk.
+
+The whole world is stored inside every log, with its hash, so that a log says by itself what it was recorded with.
+Unknown keys are refused with the nearest match; anchors that make positioning impossible are refused at load.
+`docs/world.md` shows the file key by key.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fusion.errors import WorldError
+from fusion.radio import PathLoss, Ranging
+from fusion.schema import check_keys, read_record, read_value
+from fusion.trilateration import are_collinear
+
+DRIVES = {"differential": 2, "skid_steer": 4, "none": 0}
+"""Kinds of drive with their number of wheels. Wheel order: left, right; front left, front right, rear left, rear right."""
+ENCODERS = ("quadrature", "single_channel")
+TURN_SOURCES = ("wheels", "gyro")
+FLOOR_MARGIN_M = 2.0
+"""Floor assumed beyond the outermost anchors when the world states no bounds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Anchor:
+    """An access point, beacon or UWB module: its place [m] and how its readings depend on distance."""
+
+    id: str
+    x: float
+    y: float
+    z: float
+    radio: PathLoss
+    ranging: Ranging
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryNoise:
+    """How far odometry strays: white noise whose variance grows with path, turn and time, whatever the message rate
+    (after Thrun, Burgard & Fox 2005, table 5.6), and the calibration errors that stay the same for a whole run.
+    """
+
+    distance_std_per_sqrt_m: float = 0.02
+    distance_std_per_sqrt_s: float = 0.002
+    side_std_per_sqrt_m: float = 0.01
+    turn_std_per_sqrt_rad: float = 0.03
+    turn_std_per_sqrt_m: float = 0.01
+    turn_std_per_sqrt_s: float = 0.005
+    distance_scale_std: float = 0.02
+    turn_scale_std: float = 0.02
+    turn_bias_std_rad_s: float = 0.002
+    drift_std_per_sqrt_s: float = 0.5
+    """Position noise [m/sqrt(s)] while nothing measures the motion: no odometry at all, or odometry that fell silent."""
+    turn_drift_std_per_sqrt_s: float = 0.5
+    """The same for the heading [rad/sqrt(s)]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """Wheels, encoders, gyro and antenna of the robot. The defaults are those of the paper's robot: four wheels,
+    20 ticks a revolution, 1.02 cm a tick (Moro & Mehrpouyan 2019, section II).
+    """
+
+    drive: str = "skid_steer"
+    encoder: str = "quadrature"
+    ticks_per_revolution: int = 20
+    wheel_circumference_m: float = 0.204
+    track_width_m: float = 0.15
+    distance_scale: float = 1.0
+    distance_offset_m: float = 0.0
+    turn_source: str = "wheels"
+    gyro_bias_rad_s: float = 0.0
+    antenna_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    noise: OdometryNoise = field(default_factory=OdometryNoise)
+
+    @property
+    def distance_per_tick_m(self) -> float:
+        """Distance a wheel rolls from one tick to the next [m]."""
+        return self.wheel_circumference_m / self.ticks_per_revolution
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """The floor's extent [m], map frame."""
+
+    x_min: float
+    x_max: float
+    y_min: float
+    y_max: float
+
+
+Wall = tuple[tuple[float, float], ...]
+"""Corners of one wall [m], in order."""
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """Everything an estimator may know beforehand. Build one with `load`, `from_toml` or `from_table`."""
+
+    name: str
+    anchors: tuple[Anchor, ...]
+    robot: Robot
+    bounds: Bounds
+    walls: tuple[Wall, ...]
+    provenance: str
+    hash: str
+    """SHA-256 of the world's content, whatever the order or spelling of its keys."""
+    table: str = field(repr=False)
+    """The content as canonical JSON: what `hash` is the hash of."""
+
+    @classmethod
+    def load(cls, path: Path) -> World:
+        """Read a world file; raises `WorldError` that names the file."""
+        try:
+            return cls.from_toml(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            raise WorldError(f"{path}: cannot be read ({error}); give a world file in TOML") from error
+        except WorldError as error:
+            raise WorldError(f"{path}: {error}") from error
+
+    @classmethod
+    def from_toml(cls, text: str) -> World:
+        """A world from the text of a world file."""
+        import tomllib
+
+        try:
+            return cls.from_table(tomllib.loads(text))
+        except tomllib.TOMLDecodeError as error:
+            raise WorldError(f"not TOML: {error}; correct that line") from error
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> World:
+        """A world from nested tables, as TOML or JSON gives them."""
+        known = {"name", "provenance", "anchors", "radio", "ranging", "robot", "bounds", "walls"}
+        check_keys(table, dict.fromkeys(known), "world")
+        robot = read_record(Robot, table.get("robot", {}), "robot")
+        _check_robot(robot)
+        anchors = _read_anchors(table, robot.antenna_m[2])
+        text = json.dumps(table, sort_keys=True, separators=(",", ":"))
+        return cls(
+            name=read_value(str, table.get("name", "unnamed"), "name"),
+            anchors=anchors,
+            robot=robot,
+            bounds=_read_bounds(table, anchors),
+            walls=read_value(tuple[Wall, ...], table.get("walls", ()), "walls"),
+            provenance=read_value(str, table.get("provenance", ""), "provenance"),
+            hash=hashlib.sha256(text.encode()).hexdigest(),
+            table=text,
+        )
+
+    def anchor(self, anchor_id: str) -> Anchor | None:
+        """The anchor of that id, None if the world has none."""
+        return next((anchor for anchor in self.anchors if anchor.id == anchor_id), None)
+
+
+def _read_anchors(table: Mapping[str, Any], antenna_height_m: float) -> tuple[Anchor, ...]:
+    rows = table.get("anchors", [])
+    if not isinstance(rows, list | tuple):
+        raise WorldError(f"anchors: expected [[anchors]] tables, got {rows!r}")
+    anchors = tuple(_read_anchor(row, table, antenna_height_m, f"anchors[{i}]") for i, row in enumerate(rows))
+    _check_anchors(anchors)
+    return tuple(sorted(anchors, key=lambda anchor: anchor.id))
+
+
+def _read_anchor(row: Any, world: Mapping[str, Any], antenna_height_m: float, where: str) -> Anchor:  # noqa: ANN401
+    """One [[anchors]] table; its own radio and ranging keys win over the world's. No height given: the antenna's."""
+    if not isinstance(row, Mapping):
+        raise WorldError(f"{where}: expected a table, got {row!r}")
+    check_keys(row, dict.fromkeys(("id", "position_m", "radio", "ranging")), where)
+    for key in ("id", "position_m"):
+        if key not in row:
+            raise WorldError(f"{where}: {key} is missing; add it")
+    position = read_value(tuple[float, ...], row["position_m"], f"{where}.position_m")
+    if len(position) not in (2, 3):
+        raise WorldError(f"{where}.position_m: expected [x, y] or [x, y, z], got {len(position)} numbers")
+    anchor = Anchor(
+        id=read_value(str, row["id"], f"{where}.id"),
+        x=position[0],
+        y=position[1],
+        z=position[2] if len(position) == 3 else antenna_height_m,
+        radio=read_record(PathLoss, {**world.get("radio", {}), **row.get("radio", {})}, f"{where}.radio"),
+        ranging=read_record(Ranging, {**world.get("ranging", {}), **row.get("ranging", {})}, f"{where}.ranging"),
+    )
+    for name, model, keys in (
+        ("radio", anchor.radio, ("frequency_hz", "path_loss_exponent", "reference_distance_m", "shadowing_std_db")),
+        ("ranging", anchor.ranging, ("scale", "std_m")),
+    ):
+        _require_positive(model, keys, f"{where}.{name}")
+    return anchor
+
+
+def _require_positive(record: object, keys: tuple[str, ...], where: str) -> None:
+    for key in keys:
+        if getattr(record, key) <= 0:
+            raise WorldError(f"{where}.{key}: {getattr(record, key)} must be greater than zero")
+
+
+def _check_anchors(anchors: tuple[Anchor, ...]) -> None:
+    by_id: dict[str, Anchor] = {}
+    by_place: dict[tuple[float, float, float], Anchor] = {}
+    for anchor in anchors:
+        if anchor.id in by_id:
+            raise WorldError(f"anchors: id {anchor.id!r} stands twice; give every anchor its own")
+        place = (anchor.x, anchor.y, anchor.z)
+        if place in by_place:
+            raise WorldError(f"anchors: {by_place[place].id!r} and {anchor.id!r} are both at {place}; remove one")
+        by_id[anchor.id] = by_place[place] = anchor
+    if len(anchors) >= 3 and are_collinear(np.array([[anchor.x, anchor.y] for anchor in anchors])):
+        ids = ", ".join(anchor.id for anchor in anchors)
+        raise WorldError(f"anchors: {ids} lie on one line, so left and right of it look alike; move one off the line")
+
+
+def _check_robot(robot: Robot) -> None:
+    for key, allowed in (("drive", DRIVES), ("encoder", ENCODERS), ("turn_source", TURN_SOURCES)):
+        if getattr(robot, key) not in allowed:
+            raise WorldError(f"robot.{key}: {getattr(robot, key)!r} is none of {', '.join(allowed)}")
+    _require_positive(
+        robot, ("ticks_per_revolution", "wheel_circumference_m", "track_width_m", "distance_scale"), "robot"
+    )
+    for key in (item.name for item in dataclasses.fields(robot.noise)):
+        if getattr(robot.noise, key) < 0:
+            raise WorldError(f"robot.noise.{key}: {getattr(robot.noise, key)} must not be negative")
+
+
+def _read_bounds(table: Mapping[str, Any], anchors: tuple[Anchor, ...]) -> Bounds:
+    if "bounds" in table:
+        bounds = read_record(Bounds, table["bounds"], "bounds")
+    elif not anchors:
+        raise WorldError("world: neither anchors nor bounds are given; add [[anchors]], or [bounds] for odometry alone")
+    else:
+        xs, ys = [anchor.x for anchor in anchors], [anchor.y for anchor in anchors]
+        bounds = Bounds(
+            min(xs) - FLOOR_MARGIN_M, max(xs) + FLOOR_MARGIN_M, min(ys) - FLOOR_MARGIN_M, max(ys) + FLOOR_MARGIN_M
+        )
+    if bounds.x_min >= bounds.x_max or bounds.y_min >= bounds.y_max:
+        raise WorldError(f"bounds: {bounds} enclose nothing; the minimum must be less than the maximum")
+    return bounds
