@@ -31,7 +31,7 @@ class Sighting(NamedTuple):
     variance: float
 
     def expect(self, x: float, y: float, heading: float, antenna_m: tuple[float, float, float]) -> Expectation:
-        """What the anchor should read with the robot's base at (x, y, heading) and its antenna at ``antenna_m`` on it."""
+        """What the anchor should read with the robot's base at (x, y, heading), its antenna at ``antenna_m`` on it."""
         c, s = math.cos(heading), math.sin(heading)
         arm_x, arm_y = c * antenna_m[0] - s * antenna_m[1], s * antenna_m[0] + c * antenna_m[1]
         dx, dy, dz = x + arm_x - self.anchor.x, y + arm_y - self.anchor.y, antenna_m[2] - self.anchor.z

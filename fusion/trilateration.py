@@ -62,7 +62,7 @@ def linear_least_squares(anchors: Array, distances: Array) -> tuple[float, float
 
 
 def least_squares(anchors: Array, distances: Array, stds: Array, *, iterations: int = 10) -> tuple[float, float]:
-    """The fix that minimises the weighted squared distance errors, by damped Gauss-Newton; shapes (n, 2), (n,), (n,)."""
+    """The fix of least weighted squared distance errors, by damped Gauss-Newton; shapes (n, 2), (n,), (n,)."""
     position = np.array(linear_least_squares(anchors, distances))
     cost = _cost(anchors, distances, stds, position)
     for _ in range(iterations):

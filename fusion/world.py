@@ -23,7 +23,7 @@ from fusion.schema import check_keys, read_record, read_value
 from fusion.trilateration import are_collinear
 
 DRIVES = {"differential": 2, "skid_steer": 4, "none": 0}
-"""Kinds of drive with their number of wheels. Wheel order: left, right; front left, front right, rear left, rear right."""
+"""Kinds of drive and their wheels: left, right; front left, front right, rear left, rear right."""
 ENCODERS = ("quadrature", "single_channel")
 TURN_SOURCES = ("wheels", "gyro")
 FLOOR_MARGIN_M = 2.0
@@ -58,7 +58,7 @@ class OdometryNoise:
     turn_scale_std: float = 0.02
     turn_bias_std_rad_s: float = 0.002
     drift_std_per_sqrt_s: float = 0.5
-    """Position noise [m/sqrt(s)] while nothing measures the motion: no odometry at all, or odometry that fell silent."""
+    """Position noise [m/sqrt(s)] while nothing measures the motion: no odometry, or odometry that fell silent."""
     turn_drift_std_per_sqrt_s: float = 0.5
     """The same for the heading [rad/sqrt(s)]."""
 

@@ -1,0 +1,219 @@
+"""Extended Kalman filter over the pose, with the calibration errors that spoil long runs as further states.
+
+The state is (x, y, heading), then whichever of these the world gives a standard deviation: the relative error of
+distance, the relative error of turn, the bias of the turn rate, and the common error of each anchor's readings. An
+anchor's error is a first-order Gauss-Markov process in the path driven (Gudmundson 1991: shadowing stays alike over a
+correlation distance), which also covers a constant offset. Motion is composed once per radio epoch from the
+pre-integrated increment; readings enter one at a time, all linearised and gated at the belief before the scan, so
+their order does not matter (Bar-Shalom, Li & Kirubarajan 2001, section 5.4 and eq. 5.4.2-13 for the gate).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fusion import (
+    Covariance,
+    Decision,
+    Estimate,
+    Fate,
+    Increment,
+    Measurement,
+    Odometry,
+    ParameterError,
+    Pose,
+    Prior,
+    Ranges,
+    Reason,
+    Sighting,
+    Tag,
+    WifiScan,
+    World,
+    sightings,
+    wrap_angle,
+)
+from fusion.belief import HEADING_KNOWN_STD, starting_belief
+from fusion.screen import unusable
+
+Array = NDArray[np.float64]
+POSE = slice(0, 3)
+HEADING = 2
+
+
+class State(NamedTuple):
+    """Belief at the last radio epoch and the motion since; arrays are never written to."""
+
+    time_ns: int
+    mean: Array
+    covariance: Array
+    motion: Increment
+
+
+class Ekf:
+    """Extended Kalman filter.
+
+    Parameters
+    ----------
+    gate_probability
+        A reading is refused when its normalised innovation squared is beyond this quantile of chi-square with one
+        degree of freedom. 1.0 takes every reading.
+    estimate_odometry
+        Whether distance scale, turn scale and turn-rate bias are states.
+    estimate_anchor_bias
+        Whether each anchor's common error is a state. Off, its variance is added to that of every reading.
+    bias_length_m
+        Path after which an anchor's common error is forgotten by 1/e [m].
+    """
+
+    summary: ClassVar[str] = "extended Kalman filter with odometry calibration and anchor biases as states"
+    tags: ClassVar[frozenset[Tag]] = frozenset({Tag.HEADING_START})
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        gate_probability: float = 0.999,
+        estimate_odometry: bool = True,
+        estimate_anchor_bias: bool = True,
+        bias_length_m: float = 5.0,
+    ) -> None:
+        if not 0.0 < gate_probability <= 1.0:
+            raise ParameterError(f"ekf: gate_probability is {gate_probability}; give a probability in (0, 1]")
+        if bias_length_m <= 0.0:
+            raise ParameterError(f"ekf: bias_length_m is {bias_length_m}; give a length greater than zero")
+        self._world = world
+        self._gate = chi_square_gate(gate_probability)
+        self._bias_length_m = bias_length_m
+        noise = world.robot.noise
+        calibration = (noise.distance_scale_std, noise.turn_scale_std, noise.turn_bias_std_rad_s)
+        self._calibrated = estimate_odometry and any(calibration)
+        self._first_bias = 6 if self._calibrated else 3
+        stds = list(calibration) if self._calibrated else []
+        self._bias_index: dict[tuple[str, type], int] = {}
+        for anchor in world.anchors if estimate_anchor_bias else ():
+            for model in (anchor.radio, anchor.ranging):
+                if model.bias_std > 0.0:
+                    self._bias_index[anchor.id, type(model)] = 3 + len(stds)
+                    stds.append(model.bias_std)
+        self._extra_variance = np.square(np.array(stds))
+
+    def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
+        """The prior, with every calibration error at zero."""
+        pose, pose_covariance = starting_belief(self._world, prior)
+        size = 3 + len(self._extra_variance)
+        mean, covariance = np.zeros(size), np.zeros((size, size))
+        mean[POSE] = pose
+        covariance[POSE, POSE] = pose_covariance.matrix
+        covariance[range(3, size), range(3, size)] = self._extra_variance
+        return State(prior.time_ns, mean, covariance, Increment())
+
+    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
+        """Gather motion; at a radio reading compose it and update."""
+        if isinstance(measurement, Odometry):
+            motion = state.motion.extend(measurement, self._world.robot.noise)
+            return state._replace(time_ns=measurement.time_ns, motion=motion), ()
+        if isinstance(measurement, WifiScan | Ranges):
+            return self._update(state, measurement)
+        return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+
+    def estimate(self, state: State, time_ns: int) -> Estimate:
+        """The pose after the motion since the last reading."""
+        mean, covariance = self._moved(state)
+        p = covariance.tolist()
+        spread = Covariance(p[0][0], p[0][1], p[0][2], p[1][1], p[1][2], p[2][2])
+        known = spread.hh < HEADING_KNOWN_STD**2
+        x, y, heading = mean[POSE].tolist()
+        return Estimate(time_ns, Pose(x, y, wrap_angle(heading)), spread, heading_known=known)
+
+    def _moved(self, state: State) -> tuple[Array, Array]:
+        """Mean and covariance with the pending motion composed: P <- F P Fᵀ + Q."""
+        motion = state.motion
+        if motion.duration_s == 0.0:
+            return state.mean, state.covariance
+        mean, transition = self._transition(state.mean, motion)
+        c, s = math.cos(state.mean[HEADING]), math.sin(state.mean[HEADING])
+        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        white = np.array(
+            [[motion.xx, motion.xy, motion.xh], [motion.xy, motion.yy, motion.yh], [motion.xh, motion.yh, motion.hh]]
+        )
+        covariance = transition @ state.covariance @ transition.T
+        covariance[POSE, POSE] += rotation @ white @ rotation.T
+        renewed = 1.0 - math.exp(-2.0 * motion.path_m / self._bias_length_m)
+        biases = range(self._first_bias, len(mean))
+        covariance[biases, biases] += renewed * self._extra_variance[self._first_bias - 3 :]
+        return mean, covariance
+
+    def _transition(self, mean: Array, motion: Increment) -> tuple[Array, Array]:
+        """The moved mean and the Jacobian F of the motion by the whole state."""
+        moved, transition = mean.copy(), np.eye(len(mean))
+        distance_error, turn_error, turn_bias = mean[3:6].tolist() if self._calibrated else (0.0, 0.0, 0.0)
+        stretch = 1.0 + distance_error
+        body_x = motion.x + motion.x_by_scale * turn_error + motion.x_by_bias * turn_bias
+        body_y = motion.y + motion.y_by_scale * turn_error + motion.y_by_bias * turn_bias
+        c, s = math.cos(mean[HEADING]), math.sin(mean[HEADING])
+        away_x, away_y = c * body_x - s * body_y, s * body_x + c * body_y
+        moved[0] += stretch * away_x
+        moved[1] += stretch * away_y
+        moved[HEADING] += motion.heading * (1.0 + turn_error) + motion.duration_s * turn_bias
+        transition[0, HEADING], transition[1, HEADING] = -stretch * away_y, stretch * away_x
+        if self._calibrated:
+            by_x, by_y = (
+                np.array([motion.x_by_scale, motion.x_by_bias]),
+                np.array([motion.y_by_scale, motion.y_by_bias]),
+            )
+            transition[0, 3:6] = away_x, *(stretch * (c * by_x - s * by_y))
+            transition[1, 3:6] = away_y, *(stretch * (s * by_x + c * by_y))
+            transition[2, 4:6] = motion.heading, motion.duration_s
+        kept = math.exp(-motion.path_m / self._bias_length_m)
+        biases = range(self._first_bias, len(mean))
+        moved[self._first_bias :] *= kept
+        transition[biases, biases] = kept
+        return moved, transition
+
+    def _update(self, state: State, scan: WifiScan | Ranges) -> tuple[State, tuple[Fate, ...]]:
+        prior_mean, prior_covariance = self._moved(state)
+        mean, covariance = prior_mean.copy(), prior_covariance
+        fates = []
+        for sighting in sightings(self._world, scan):
+            innovation, row, variance = self._linearise(sighting, prior_mean)
+            spread = float(row @ prior_covariance @ row) + variance
+            nis = innovation * innovation / spread
+            used = nis <= self._gate
+            if used:
+                gain_numerator = covariance @ row
+                total = float(row @ gain_numerator) + variance
+                remaining = innovation - float(row @ (mean - prior_mean))
+                mean = mean + gain_numerator * (remaining / total)
+                covariance = covariance - np.outer(gain_numerator, gain_numerator / total)
+            verdict = (Decision.USED, Reason.OK, 1.0) if used else (Decision.REJECTED, Reason.GATE, 0.0)
+            who = (scan.time_ns, scan.sensor, scan.seq, sighting.anchor.id)
+            fates.append(Fate(*who, *verdict, innovation, spread, nis))
+        mean[HEADING] = wrap_angle(float(mean[HEADING]))
+        return State(scan.time_ns, mean, 0.5 * (covariance + covariance.T), Increment()), tuple(fates)
+
+    def _linearise(self, sighting: Sighting, mean: Array) -> tuple[float, Array, float]:
+        """Innovation, Jacobian row and variance of one reading at the belief ``mean``."""
+        x, y, heading = mean[POSE].tolist()
+        expected = sighting.expect(x, y, heading, self._world.robot.antenna_m)
+        row = np.zeros(len(mean))
+        row[POSE] = expected.by_x, expected.by_y, expected.by_heading
+        index = self._bias_index.get((sighting.anchor.id, type(sighting.model)))
+        if index is None:
+            return sighting.value - expected.value, row, sighting.variance + sighting.model.bias_std**2
+        row[index] = 1.0
+        return sighting.value - expected.value - float(mean[index]), row, sighting.variance
+
+
+def chi_square_gate(probability: float) -> float:
+    """The quantile of chi-square with one degree of freedom: the square of the normal's two-sided quantile.
+
+    >>> round(chi_square_gate(0.99), 4)
+    6.6349
+    """
+    from statistics import NormalDist
+
+    return math.inf if probability == 1.0 else NormalDist().inv_cdf(0.5 + 0.5 * probability) ** 2
