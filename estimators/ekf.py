@@ -37,6 +37,7 @@ from fusion import (
     wrap_angle,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
+from fusion.radio import PathLoss, Ranging
 from fusion.screen import unusable
 
 Array = NDArray[np.float64]
@@ -63,10 +64,13 @@ class Ekf:
         degree of freedom. 1.0 takes every reading.
     estimate_odometry
         Whether distance scale, turn scale and turn-rate bias are states.
-    estimate_anchor_bias
-        Whether each anchor's common error is a state. Off, its variance is added to that of every reading.
-    bias_length_m
-        Path after which an anchor's common error is forgotten by 1/e [m].
+    estimate_range_bias, estimate_rssi_bias
+        Whether each anchor's common error is a state. Off, its variance is added to that of every reading. A range
+        offset belongs to the radio and is well worth a state. Shadowing belongs to the place, and while the heading
+        is poor such states explain away the readings that would correct it, so for RSSI they are off.
+    rssi_bias_length_m, range_bias_length_m
+        Path after which an anchor's common error is forgotten by 1/e [m]: shadowing belongs to the place, a range
+        offset to the radio.
     """
 
     summary: ClassVar[str] = "extended Kalman filter with odometry calibration and anchor biases as states"
@@ -78,28 +82,40 @@ class Ekf:
         *,
         gate_probability: float = 0.999,
         estimate_odometry: bool = True,
-        estimate_anchor_bias: bool = True,
-        bias_length_m: float = 5.0,
+        estimate_range_bias: bool = True,
+        estimate_rssi_bias: bool = False,
+        rssi_bias_length_m: float = 5.0,
+        range_bias_length_m: float = 100.0,
     ) -> None:
         if not 0.0 < gate_probability <= 1.0:
             raise ParameterError(f"ekf: gate_probability is {gate_probability}; give a probability in (0, 1]")
-        if bias_length_m <= 0.0:
-            raise ParameterError(f"ekf: bias_length_m is {bias_length_m}; give a length greater than zero")
+        for length_m in (rssi_bias_length_m, range_bias_length_m):
+            if length_m <= 0.0:
+                raise ParameterError(f"ekf: a bias length is {length_m}; give a length greater than zero")
         self._world = world
         self._gate = chi_square_gate(gate_probability)
-        self._bias_length_m = bias_length_m
         noise = world.robot.noise
         calibration = (noise.distance_scale_std, noise.turn_scale_std, noise.turn_bias_std_rad_s)
         self._calibrated = estimate_odometry and any(calibration)
-        self._first_bias = 6 if self._calibrated else 3
         stds = list(calibration) if self._calibrated else []
+        models = [(anchor.id, model) for anchor in world.anchors for model in (anchor.radio, anchor.ranging)]
+        self._gain_index: dict[type, int] = {}
+        for _, model in models:
+            if model.gain_std > 0.0 and type(model) not in self._gain_index:
+                self._gain_index[type(model)] = 3 + len(stds)
+                stds.append(model.gain_std)
+        self._first_bias = 3 + len(stds)
         self._bias_index: dict[tuple[str, type], int] = {}
-        for anchor in world.anchors if estimate_anchor_bias else ():
-            for model in (anchor.radio, anchor.ranging):
-                if model.bias_std > 0.0:
-                    self._bias_index[anchor.id, type(model)] = 3 + len(stds)
-                    stds.append(model.bias_std)
+        lengths_m = {PathLoss: rssi_bias_length_m, Ranging: range_bias_length_m}
+        kept_m = []
+        wanted = {PathLoss: estimate_rssi_bias, Ranging: estimate_range_bias}
+        for anchor_id, model in models:
+            if wanted[type(model)] and model.bias_std > 0.0:
+                self._bias_index[anchor_id, type(model)] = 3 + len(stds)
+                stds.append(model.bias_std)
+                kept_m.append(lengths_m[type(model)])
         self._extra_variance = np.square(np.array(stds))
+        self._bias_length_m = np.array(kept_m)
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
         """The prior, with every calibration error at zero."""
@@ -142,7 +158,7 @@ class Ekf:
         )
         covariance = transition @ state.covariance @ transition.T
         covariance[POSE, POSE] += rotation @ white @ rotation.T
-        renewed = 1.0 - math.exp(-2.0 * motion.path_m / self._bias_length_m)
+        renewed = 1.0 - np.exp(-2.0 * motion.path_m / self._bias_length_m)
         biases = range(self._first_bias, len(mean))
         covariance[biases, biases] += renewed * self._extra_variance[self._first_bias - 3 :]
         return mean, covariance
@@ -168,7 +184,7 @@ class Ekf:
             transition[0, 3:6] = away_x, *(stretch * (c * by_x - s * by_y))
             transition[1, 3:6] = away_y, *(stretch * (s * by_x + c * by_y))
             transition[2, 4:6] = motion.heading, motion.duration_s
-        kept = math.exp(-motion.path_m / self._bias_length_m)
+        kept = np.exp(-motion.path_m / self._bias_length_m)
         biases = range(self._first_bias, len(mean))
         moved[self._first_bias :] *= kept
         transition[biases, biases] = kept
@@ -201,11 +217,14 @@ class Ekf:
         expected = sighting.expect(x, y, heading, self._world.robot.antenna_m)
         row = np.zeros(len(mean))
         row[POSE] = expected.by_x, expected.by_y, expected.by_heading
-        index = self._bias_index.get((sighting.anchor.id, type(sighting.model)))
-        if index is None:
-            return sighting.value - expected.value, row, sighting.variance + sighting.model.bias_std**2
-        row[index] = 1.0
-        return sighting.value - expected.value - float(mean[index]), row, sighting.variance
+        innovation, variance, kind = sighting.value - expected.value, sighting.variance, type(sighting.model)
+        if (gain := self._gain_index.get(kind)) is not None:
+            row[gain] = expected.by_gain
+            innovation -= expected.by_gain * float(mean[gain])
+        if (bias := self._bias_index.get((sighting.anchor.id, kind))) is None:
+            return innovation, row, variance + sighting.model.bias_std**2
+        row[bias] = 1.0
+        return innovation - float(mean[bias]), row, variance
 
 
 def chi_square_gate(probability: float) -> float:

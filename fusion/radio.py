@@ -51,6 +51,13 @@ class DistanceModel(Protocol):
     def distance(self, reading: ArrayLike) -> Array:
         """The distance [m] at which ``reading`` is expected."""
 
+    @property
+    def gain_std(self) -> float:
+        """How far the dependence on distance may be off for all anchors together, one standard deviation."""
+
+    def by_gain(self, distance_m: ArrayLike) -> Array:
+        """Derivative of ``expected`` by that common error."""
+
 
 @dataclass(frozen=True, slots=True)
 class PathLoss:
@@ -66,7 +73,8 @@ class PathLoss:
     receive_gain_dbi: float = 0.0
     reference_rssi_dbm: float | None = None
     shadowing_std_db: float = 4.0
-    bias_std_db: float = 0.0
+    bias_std_db: float = 4.0
+    exponent_std: float = 0.0
 
     @property
     def rssi_at_reference_dbm(self) -> float:
@@ -102,6 +110,16 @@ class PathLoss:
         exponent = (self.rssi_at_reference_dbm - np.asarray(reading)) / (10.0 * self.path_loss_exponent)
         return np.asarray(self.reference_distance_m * np.power(10.0, np.maximum(exponent, 0.0)))
 
+    @property
+    def gain_std(self) -> float:
+        """Common error of the path-loss exponent."""
+        return self.exponent_std
+
+    def by_gain(self, distance_m: ArrayLike) -> Array:
+        """dRSSI/dn [dB]: -10 log10(d / d0)."""
+        ratio = np.maximum(distance_m, self.reference_distance_m) / self.reference_distance_m
+        return np.asarray(-10.0 * np.log10(ratio))
+
 
 @dataclass(frozen=True, slots=True)
 class Ranging:
@@ -110,7 +128,8 @@ class Ranging:
     scale: float = 1.0
     offset_m: float = 0.0
     std_m: float = 0.15
-    bias_std_m: float = 0.0
+    bias_std_m: float = 0.15
+    scale_std: float = 0.05
 
     @property
     def std(self) -> float:
@@ -133,3 +152,12 @@ class Ranging:
     def distance(self, reading: ArrayLike) -> Array:
         """Distance [m] behind a measured range; never less than zero."""
         return np.asarray(np.maximum((np.asarray(reading) - self.offset_m) / self.scale, 0.0))
+
+    @property
+    def gain_std(self) -> float:
+        """Common error of the scale."""
+        return self.scale_std
+
+    def by_gain(self, distance_m: ArrayLike) -> Array:
+        """The distance itself."""
+        return np.asarray(distance_m)

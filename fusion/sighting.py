@@ -14,12 +14,13 @@ from fusion.world import Anchor, World
 
 
 class Expectation(NamedTuple):
-    """The reading expected at a pose, and its derivatives [reading's unit / m, / m, / rad]."""
+    """The reading expected at a pose, and its derivatives [reading's unit / m, / m, / rad, / the model's gain]."""
 
     value: float
     by_x: float
     by_y: float
     by_heading: float
+    by_gain: float
 
 
 class Sighting(NamedTuple):
@@ -38,7 +39,11 @@ class Sighting(NamedTuple):
         distance = max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-6)
         slope = float(self.model.slope(distance)) / distance
         return Expectation(
-            float(self.model.expected(distance)), slope * dx, slope * dy, slope * (dy * arm_x - dx * arm_y)
+            float(self.model.expected(distance)),
+            slope * dx,
+            slope * dy,
+            slope * (dy * arm_x - dx * arm_y),
+            float(self.model.by_gain(distance)),
         )
 
     def expected_values(

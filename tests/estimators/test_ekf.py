@@ -1,6 +1,7 @@
 """The extended Kalman filter against filterpy, against the exact Kalman filter, and against a turned world."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,7 +30,8 @@ PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0), "d": (9.0, 7.0)}
 
 def world(noise=PLAIN_NOISE, places=PLACES, **ranging):
     anchors = [{"id": name, "position_m": list(place)} for name, place in places.items()]
-    return World.from_table({"anchors": anchors, "robot": {"noise": noise}, "ranging": {"std_m": 0.2, **ranging}})
+    plain = {"std_m": 0.2, "bias_std_m": 0.0, "scale_std": 0.0}
+    return World.from_table({"anchors": anchors, "robot": {"noise": noise}, "ranging": {**plain, **ranging}})
 
 
 def drive(places=PLACES, turned=Pose(0.0, 0.0, 0.0), seconds=20, seed=3, bias=None, outlier_at=None):
@@ -156,10 +158,8 @@ def test_anchor_biases_are_found_and_taken_off():
     bias = {"a": 0.5, "b": -0.4, "c": 0.3, "d": 0.5}
     measurements, truth = drive(seconds=120, bias=bias)
     place = world(bias_std_m=0.5)
-    plain, aware = (
-        positions(final(track(Ekf(place, estimate_anchor_bias=on, bias_length_m=1e6), place, measurements, prior())))
-        for on in (False, True)
-    )
+    filters = [Ekf(place, estimate_range_bias=on, range_bias_length_m=1e6) for on in (False, True)]
+    plain, aware = (positions(final(track(one, place, measurements, prior()))) for one in filters)
     rmse = [float(np.sqrt(np.mean(np.sum((p - truth) ** 2, axis=1)[300:]))) for p in (plain, aware)]
     assert rmse[1] < 0.7 * rmse[0]
 
@@ -178,7 +178,26 @@ def test_gate_is_the_chi_square_quantile(probability):
     assert chi_square_gate(probability) == pytest.approx(chi2.ppf(probability, 1), rel=1e-9)
 
 
-@pytest.mark.parametrize("options", [{"gate_probability": 0.0}, {"gate_probability": 1.5}, {"bias_length_m": 0.0}])
+@pytest.mark.parametrize(
+    "options", [{"gate_probability": 0.0}, {"gate_probability": 1.5}, {"range_bias_length_m": 0.0}]
+)
 def test_impossible_options_are_refused(options):
     with pytest.raises(ParameterError, match="ekf"):
         Ekf(world(), **options)
+
+
+def test_common_scale_error_of_all_ranges_is_found():
+    """Ranges 7 % long, as a real set of radios was: the scale state finds it, and the track comes back."""
+    measurements, truth = drive(seconds=120)
+    stretched = [
+        replace(m, readings=tuple(r._replace(range_m=1.07 * r.range_m) for r in m.readings))
+        if isinstance(m, Ranges)
+        else m
+        for m in measurements
+    ]
+    errors = []
+    for scale_std in (0.0, 0.05):
+        place = world(scale_std=scale_std)
+        track_ = positions(final(track(Ekf(place), place, stretched, prior())))
+        errors.append(float(np.sqrt(np.mean(np.sum((track_ - truth) ** 2, axis=1)[300:]))))
+    assert errors[1] < 0.5 * errors[0]

@@ -1,0 +1,203 @@
+"""``fusion bench``: score estimators on recorded runs, all on the same measurements from the same start."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Protocol
+
+import fusion
+from benchmarks.cell import STATUSES, Cell, Score, cached_run, crashed, score_cell
+from benchmarks.score import pool
+from benchmarks.workers import compute
+from fusion import FusionError, LogError, ParameterError
+from fusion.errors import did_you_mean
+
+POOLED = "all runs"
+LOST = "the worker process died, twice; run it alone with --workers 1 to see why"
+
+Settings = Mapping[str, Mapping[str, object]]
+"""Parameters by estimator."""
+
+
+class Progress(Protocol):
+    """Told how far the bench is: cells done, of how many, and which was last."""
+
+    def __call__(self, done: int, total: int, what: str) -> None:
+        """One more cell is done."""
+
+
+def bench(
+    runs: Sequence[Path],
+    *,
+    estimators: Sequence[str] | None = None,
+    settings: Settings | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> list[Score]:
+    """The score of every estimator (None: of all installed) on every run, in that order, runs first.
+
+    Everything that can be refused is refused before any work: raises `PluginError`, `ParameterError` or `LogError`.
+    ``workers`` None: one per core; 1: in this process, where alone estimators of `fusion.registered` are known.
+    """
+    chosen = tuple(dict.fromkeys(fusion.names() if estimators is None else estimators))
+    check(runs, chosen, settings or {})
+    cells = [Cell(path, name, dict((settings or {}).get(name, {})), seed) for path in runs for name in chosen]
+    workers = min(os.cpu_count() or 1 if workers is None else workers, len(cells))
+    scores: dict[int, Score] = {}
+    for index, score in compute(score_cell, _lost, cells, workers):
+        scores[index] = score
+        if progress is not None:
+            progress(len(scores), len(cells), f"{score.run} {score.estimator}")
+    return [scores[index] for index in sorted(scores)]
+
+
+def _lost(cell: Cell) -> Score:
+    return crashed(cell, LOST)
+
+
+def check(runs: Sequence[Path], estimators: Sequence[str], settings: Settings) -> None:
+    """Refuse what is missing or misspelt."""
+    for name in estimators:
+        if name not in fusion.names():
+            fusion.load(name)
+    for path in runs:
+        if not path.is_file():
+            raise LogError(f"{path}: no such file; give an MCAP log (`fusion simulate` makes one)")
+    for name, options in settings.items():
+        if name not in estimators:
+            raise ParameterError(f"--set {name}: this estimator is not benched; {did_you_mean(name, estimators)}")
+        fusion.build(name, cached_run(runs[0]).world, options)
+
+
+def pooled(scores: Sequence[Score]) -> list[Score]:
+    """One score per estimator over all instants of all runs together; its status is the worst of its runs'."""
+    together = []
+    for name in dict.fromkeys(score.estimator for score in scores):
+        own = [score for score in scores if score.estimator == name]
+        measured = [score.errors for score in own if score.errors is not None]
+        status = max((score.status for score in own), key=STATUSES.index)
+        facts = {"cpu_per_measurement_s": _pooled_cost(own)}
+        together.append(Score(POOLED, name, status, errors=pool(measured) if measured else None, facts=facts))
+    return together
+
+
+def _pooled_cost(scores: Sequence[Score]) -> float | None:
+    """Processor time per measurement over the runs the estimator survived."""
+    facts: list[Mapping[str, Any]] = [score.facts for score in scores if "cpu_s" in score.facts]
+    measurements = sum(fact["measurements"] for fact in facts)
+    return sum(fact["cpu_s"] for fact in facts) / measurements if measurements else None
+
+
+def parse_settings(words: Sequence[str]) -> dict[str, dict[str, object]]:
+    """``estimator.parameter=value`` words as parameters by estimator; a value is a JSON value, or else text.
+
+    >>> parse_settings(["ekf.gate_probability=0.99", "ekf.mode=fast"])
+    {'ekf': {'gate_probability': 0.99, 'mode': 'fast'}}
+    """
+    settings: dict[str, dict[str, object]] = {}
+    for word in words:
+        target, equals, value = word.partition("=")
+        estimator, dot, parameter = target.partition(".")
+        if not (equals and dot and estimator and parameter):
+            raise ParameterError(f"--set {word}: expected ESTIMATOR.PARAMETER=VALUE, as in ekf.gate_probability=0.99")
+        settings.setdefault(estimator, {})[parameter] = parse_value(value)
+    return settings
+
+
+def parse_value(text: str) -> object:
+    """A JSON value, or the text itself where it is none."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion bench``."""
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="MCAP logs")
+    parser.add_argument("--estimators", metavar="A,B", help="names, separated by commas; all installed by default")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME.KEY=VALUE", help="a parameter of an estimator; repeatable"
+    )
+    parser.add_argument("--json", type=Path, metavar="OUT", help="write one record per run and estimator; - for stdout")
+    parser.add_argument("--seed", type=int, default=0, help="of the estimators that draw random numbers")
+    parser.add_argument("--workers", type=_at_least_one, metavar="N", help="processes; one per core by default")
+
+
+def _at_least_one(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{number} workers do nothing; give 1 or more")
+    return number
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Bench, print the tables, write the records. Exit code 1 when no estimator survived."""
+    chosen = arguments.estimators.split(",") if arguments.estimators else None
+    with _progress_bar() as progress:
+        scores = bench(
+            arguments.runs,
+            estimators=chosen,
+            settings=parse_settings(arguments.set),
+            seed=arguments.seed,
+            workers=arguments.workers,
+            progress=progress,
+        )
+    for remark in remarks(scores):
+        sys.stderr.write(f"fusion bench: {remark}\n")
+    if arguments.json != Path("-"):
+        from benchmarks.table import print_tables
+
+        print_tables(scores, pooled(scores))
+    if arguments.json is not None:
+        write_records(scores, arguments.json)
+    return 1 if all(score.status == "crashed" for score in scores) else 0
+
+
+def remarks(scores: Sequence[Score]) -> list[str]:
+    """What the tables cannot say: logs without truth, warnings of logs, why an estimator crashed."""
+    told: list[str] = []
+    for score in scores:
+        warnings = score.facts["warnings"]
+        if isinstance(warnings, list):
+            told += [f"{score.run}: {warning}" for warning in warnings]
+        if score.errors is None:
+            told.append(f"{score.run} holds no ground truth: no errors are scored, only time, digest, fates and NIS")
+        if score.error is not None:
+            told.append(f"{score.run}: {score.estimator} crashed: {score.error}")
+    return list(dict.fromkeys(told))
+
+
+def write_records(scores: Sequence[Score], output: Path) -> None:
+    """The records of `Score.record` as one JSON list; ``-`` is stdout."""
+    text = json.dumps([score.record() for score in scores], indent=1, allow_nan=False, default=str) + "\n"
+    if output == Path("-"):
+        sys.stdout.write(text)
+        return
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise FusionError(f"{output}: scores cannot be written ({error.strerror}); give another place") from error
+
+
+@contextmanager
+def _progress_bar() -> Iterator[Progress]:
+    """A bar on stderr where somebody looks at it."""
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    with Bar(console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True) as bar:
+        task = bar.add_task("bench", total=None)
+
+        def tell(done: int, total: int, what: str) -> None:
+            bar.update(task, completed=done, total=total, description=what)
+
+        yield tell

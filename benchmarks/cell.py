@@ -1,0 +1,149 @@
+"""One cell of a benchmark: one estimator on one log, a pure function of log, estimator, parameters and seed.
+
+Only paths and small results cross the border between processes, never a log's content.
+"""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import fusion
+from benchmarks.instants import evaluation_instants, match
+from benchmarks.lane import Lane, run_lane
+from benchmarks.score import Errors, errors, metrics
+from fusion import Decision, Estimate
+from logs.reader import read_run
+from logs.run import Run
+
+LEAST_AVAILABILITY = 0.5
+"""An estimator with fewer valid answers than this counts as diverged."""
+STATUSES = ("ok", "unscored", "diverged", "crashed")
+"""What can become of a cell, best first; ``unscored``: the log holds no ground truth."""
+
+
+class Cell(NamedTuple):
+    """What is to be computed. ``options`` are the estimator's parameters, those not given at their defaults."""
+
+    path: Path
+    estimator: str
+    options: Mapping[str, object]
+    seed: int
+
+
+@dataclass(frozen=True)
+class Score:
+    """The result of one cell: see `record` for its meaning. ``errors`` is None without truth."""
+
+    run: str
+    estimator: str
+    status: str
+    error: str | None = None
+    errors: Errors | None = None
+    facts: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Metrics by id (`benchmarks.score`); empty without truth."""
+        return {} if self.errors is None else metrics(self.errors)
+
+    def record(self) -> dict[str, object]:
+        """Everything as one flat table for strict JSON: metrics beside facts, in SI units.
+
+        JSON knows neither infinity nor NaN. Both are None: read them with ``status`` (a median that is infinite
+        makes it ``diverged``) and ``availability`` (below 0.75, ``pos_p75`` is infinite).
+        """
+        scores = {key: value if math.isfinite(value) else None for key, value in self.metrics.items()}
+        head = {"run": self.run, "estimator": self.estimator, "status": self.status, "error": self.error}
+        return {**head, **scores, **self.facts}
+
+
+@lru_cache(maxsize=1)
+def _read(path: Path, _modified_ns: int) -> Run:
+    return read_run(path)
+
+
+def cached_run(path: Path) -> Run:
+    """The log at ``path``, kept until another is asked for or it changes; raises `LogError`."""
+    return _read(path, path.stat().st_mtime_ns if path.exists() else 0)
+
+
+def score_cell(cell: Cell) -> Score:
+    """Run the estimator and judge it. Raises `LogError` for the log; what the estimator does is in the score."""
+    run = cached_run(cell.path)
+    lane = run_lane(run, cell.estimator, cell.options, cell.seed)
+    measured = _errors(run, lane)
+    status = _status(lane, measured)
+    return Score(run.name, cell.estimator, status, lane.error, measured, {**_facts(cell, run), **_cost(run, lane)})
+
+
+def crashed(cell: Cell, error: str) -> Score:
+    """The score of a cell whose process did not survive."""
+    run = cached_run(cell.path)
+    lane = Lane(cell.estimator, (), "", 0.0, error)
+    return Score(run.name, cell.estimator, "crashed", error, _errors(run, lane), _facts(cell, run))
+
+
+def _errors(run: Run, lane: Lane) -> Errors | None:
+    """None without truth. An estimator that crashed gave no answer at all: half a run is not a result."""
+    if run.truth is None:
+        return None
+    instants = evaluation_instants(run.truth)
+    if len(instants.time_ns) == 0:
+        return None
+    return errors(instants, match(instants, () if lane.error else lane.updates))
+
+
+def _status(lane: Lane, measured: Errors | None) -> str:
+    if lane.error is not None:
+        return "crashed"
+    if not all(_is_sound(update.estimate) for update in lane.updates):
+        return "diverged"
+    if measured is None:
+        return "unscored"
+    available = float(np.isfinite(measured.position).mean())
+    # Fewer than half of the answers valid is also what makes the median infinite.
+    return "diverged" if available < LEAST_AVAILABILITY or not math.isfinite(metrics(measured)["pos_p50"]) else "ok"
+
+
+def _is_sound(estimate: Estimate) -> bool:
+    """What an estimator does not claim, a position not valid or a heading not known, may be any number."""
+    x, y, heading = map(math.isfinite, estimate.pose)
+    return not estimate.valid or (x and y and (heading or not estimate.heading_known))
+
+
+def _facts(cell: Cell, run: Run) -> dict[str, object]:
+    return {
+        "log": str(cell.path),
+        "warnings": list(run.warnings),
+        "seed": cell.seed,
+        "parameters": dict(cell.options),
+        "world": run.world.name,
+        "world_hash": run.world.hash,
+        "measurements": len(run.measurements),
+        "versions": {"fusion": fusion.__version__, "numpy": np.__version__, "python": platform.python_version()},
+    }
+
+
+def _cost(run: Run, lane: Lane) -> dict[str, object]:
+    """What needs no truth: digest, processor time, fates and the mean NIS of the last word on each measurement."""
+    if lane.error is not None:
+        return {}
+    fates = [fate for update in lane.final for fate in update.fates]
+    decisions = Counter(fate.decision for fate in fates)
+    nis = [fate.nis for fate in fates if fate.nis is not None]
+    return {
+        "digest": lane.digest,
+        "cpu_s": lane.cpu_s,
+        "cpu_per_measurement_s": lane.cpu_s / len(run.measurements) if run.measurements else None,
+        "fates": {decision.value: decisions[decision] for decision in Decision},
+        "nis_mean": float(np.mean(nis)) if nis and np.isfinite(nis).all() else None,
+    }

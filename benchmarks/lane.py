@@ -1,0 +1,52 @@
+"""One estimator over one run: everything it said, what it cost, and how it ended if it did not survive."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import fusion
+from benchmarks.prior import starting_prior
+from fusion import FusionError, Update
+from logs.run import Run
+
+
+@dataclass(frozen=True)
+class Lane:
+    """What one estimator made of one run.
+
+    ``updates`` stand in the order of arrival, revisions among them; ``digest`` certifies them. ``cpu_s`` is the
+    processor time of the fold alone. ``error`` is None, or why the estimator stopped: ``updates`` ends there then,
+    ``digest`` is empty and ``cpu_s`` zero.
+    """
+
+    name: str
+    updates: tuple[Update, ...]
+    digest: str
+    cpu_s: float
+    error: str | None
+
+    @cached_property
+    def final(self) -> tuple[Update, ...]:
+        """The last word on each measurement, in time order."""
+        return tuple(fusion.final(self.updates))
+
+
+def run_lane(run: Run, estimator: str, options: Mapping[str, object] | None = None, seed: int = 0) -> Lane:
+    """Fold the measurements of ``run`` through the estimator of that name. Never raises for what a plug-in does."""
+    updates: list[Update] = []
+    certificate, error, cpu_s = "", None, 0.0
+    try:
+        built, prior = fusion.build(estimator, run.world, options), starting_prior(run)
+        started_s = time.process_time()
+        updates.extend(fusion.track(built, run.world, run.measurements, prior, seed=seed))
+        cpu_s = time.process_time() - started_s
+        # Reads every number there is, so an answer that is no number ends here and not in the scores.
+        certificate = fusion.digest(updates)
+    except FusionError as known:
+        error = str(known)
+    except Exception as unknown:  # noqa: BLE001 - a plug-in may fail in any way, and costs only its own lane
+        error = f"{estimator} failed: {unknown!r}; check it with `fusion check {estimator}`"
+    return Lane(estimator, tuple(updates), certificate, cpu_s, error)

@@ -1,0 +1,120 @@
+"""``fusion replay``: run one estimator over a log again, and keep everything it said beside the measurements."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import fusion
+from benchmarks.bench import parse_value
+from benchmarks.instants import reception_ns
+from benchmarks.lane import Lane, run_lane
+from fusion import LogError, ParameterError, PluginError, Truth
+from logs.reader import read_run
+from logs.run import Run, TruthTrack
+from logs.writer import RunWriter
+
+
+def replay(
+    run: Path,
+    estimator: str,
+    output: Path | None = None,
+    *,
+    options: Mapping[str, object] | None = None,
+    seed: int = 0,
+    verify: Path | None = None,
+) -> str:
+    """Fold ``run`` through ``estimator`` and answer the digest of all it said.
+
+    ``output``: a new log with the measurements and truth of ``run`` and the estimates and Fates as channels; the same
+    arguments give the same bytes. ``verify``: an earlier replay whose digest must be the same. Raises `LogError`,
+    `PluginError` or `ParameterError`.
+    """
+    if output is not None and output.resolve() == run.resolve():
+        raise LogError(f"{output}: this is the log being replayed; give the output another name")
+    recorded = read_run(run)
+    fusion.build(estimator, recorded.world, options)
+    lane = run_lane(recorded, estimator, options, seed)
+    if lane.error is not None:
+        raise PluginError(f"{estimator} did not survive {run}: {lane.error}")
+    if verify is not None:
+        _verify(verify, lane)
+    if output is not None:
+        certificate = {"digest": lane.digest, "estimator": estimator, "seed": str(seed)}
+        certificate["parameters"] = json.dumps(dict(options or {}), sort_keys=True)
+        _write(recorded, lane, output, {**recorded.metadata, **certificate})
+    return lane.digest
+
+
+def _verify(earlier: Path, lane: Lane) -> None:
+    kept = read_run(earlier).metadata.get("digest")
+    if kept is None:
+        raise LogError(f"{earlier}: holds no digest; give a log that `fusion replay` wrote")
+    if kept != lane.digest:
+        raise LogError(
+            f"{earlier}: its digest is {kept}, this replay's is {lane.digest}; compare seed, parameters and versions"
+        )
+
+
+def _write(run: Run, lane: Lane, output: Path, metadata: Mapping[str, str]) -> None:
+    """Messages in the order they came in, each followed by what the estimator said to it."""
+    truths = _truths(run.truth) if run.truth is not None else []
+    with RunWriter(output, run.world, name=run.name, prior=run.prior, metadata=metadata) as writer:
+        for update, received_ns in zip(lane.updates, reception_ns(lane.updates).tolist(), strict=True):
+            while truths and truths[-1].time_ns <= received_ns:
+                writer.write_truth(truths.pop())
+            # The host answers every message with one update of its own; those after it are revisions.
+            if not update.revised:
+                writer.write(update.measurement, log_time_ns=max(received_ns, 0))
+            writer.write_update(lane.name, update)
+        for truth in reversed(truths):
+            writer.write_truth(truth)
+
+
+def _truths(track: TruthTrack) -> list[Truth]:
+    """The true poses, the last one first; a heading that is not a number is not known."""
+    columns = (track.time_ns.tolist(), track.x.tolist(), track.y.tolist(), track.heading.tolist())
+    rows = zip(*columns, strict=True)
+    return [Truth(t, x, y, None if math.isnan(heading) else heading) for t, x, y, heading in rows][::-1]
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion replay``."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="an MCAP log")
+    parser.add_argument("--estimator", required=True, metavar="NAME", help="`fusion estimators` lists them")
+    parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="the log to write")
+    parser.add_argument("--seed", type=int, default=0, help="of an estimator that draws random numbers")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="a parameter of the estimator; repeatable"
+    )
+    parser.add_argument("--verify", type=Path, metavar="LOG", help="fail unless this earlier replay said the same")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Replay, and print the digest."""
+    if arguments.output is None and arguments.verify is None:
+        raise ParameterError("nothing to do with what the estimator says; give -o OUT.mcap, --verify LOG or both")
+    digest = replay(
+        arguments.run,
+        arguments.estimator,
+        arguments.output,
+        options=_options(arguments.set),
+        seed=arguments.seed,
+        verify=arguments.verify,
+    )
+    sys.stdout.write(f"{digest}\n")
+    return 0
+
+
+def _options(words: Sequence[str]) -> dict[str, object]:
+    options: dict[str, object] = {}
+    for word in words:
+        key, equals, value = word.partition("=")
+        if not equals or not key:
+            raise ParameterError(f"--set {word}: expected PARAMETER=VALUE, as in gate_probability=0.99")
+        options[key] = parse_value(value)
+    return options

@@ -1,0 +1,83 @@
+"""Scores as tables for people: centimetres, degrees, microseconds, the best first."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from typing import IO, NamedTuple
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.cell import STATUSES, Score
+
+WIDTH = 120
+"""Columns of a table that goes into a file or a pipe."""
+
+
+class Column(NamedTuple):
+    """One number of a score: its key in the record, and how a person wants it."""
+
+    key: str
+    title: str
+    factor: float
+    decimals: int
+
+
+COLUMNS = (
+    Column("pos_rmse", "RMSE\ncm", 100.0, 1),
+    Column("pos_mean", "mean\ncm", 100.0, 1),
+    Column("pos_p50", "median\ncm", 100.0, 1),
+    Column("pos_p75", "p75\ncm", 100.0, 1),
+    Column("pos_p95", "p95\ncm", 100.0, 1),
+    Column("pos_max", "max\ncm", 100.0, 1),
+    Column("head_rmse", "heading\nRMSE °", math.degrees(1.0), 2),
+    Column("anees", "ANEES", 1.0, 2),
+    Column("availability", "avail.\n%", 100.0, 1),
+    Column("cpu_per_measurement_s", "time\nµs/msg", 1e6, 0),
+)
+
+
+def ranked(scores: Sequence[Score]) -> list[Score]:
+    """The best first: by status, then by the third quartile of the position error, infinite last."""
+
+    def key(score: Score) -> tuple[int, float, str]:
+        third_quartile = score.metrics.get("pos_p75", math.nan)
+        return STATUSES.index(score.status), math.inf if math.isnan(third_quartile) else third_quartile, score.estimator
+
+    return sorted(scores, key=key)
+
+
+def print_tables(scores: Sequence[Score], pooled: Sequence[Score], file: IO[str] | None = None) -> None:
+    """One table per run, and one over all of them where there are several."""
+    console = Console(file=file or sys.stdout)
+    if not console.is_terminal:
+        console.width = WIDTH
+    by_log: dict[object, list[Score]] = {}
+    for score in scores:
+        by_log.setdefault(score.facts.get("log", score.run), []).append(score)
+    for own in by_log.values():
+        console.print(_table(own[0].run, own))
+    if len(by_log) > 1:
+        console.print(_table(f"all {len(by_log)} runs together", pooled))
+
+
+def _table(title: str, scores: Sequence[Score]) -> Table:
+    table = Table(title=title, box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    table.add_column("position error of\nestimator", no_wrap=True)
+    for column in COLUMNS:
+        table.add_column(column.title, justify="right", no_wrap=True)
+    for score in ranked(scores):
+        remark = "" if score.status in ("ok", "unscored") else f" ({score.status})"
+        values = {**score.facts, **score.metrics}
+        table.add_row(score.estimator + remark, *(_cell(column, values) for column in COLUMNS))
+    return table
+
+
+def _cell(column: Column, values: Mapping[str, object]) -> str:
+    value = values.get(column.key)
+    if not isinstance(value, float) or math.isnan(value):
+        return "–"
+    return "∞" if math.isinf(value) else f"{value * column.factor:.{column.decimals}f}"

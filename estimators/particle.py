@@ -1,0 +1,159 @@
+"""Particle filter: the belief is a cloud of weighted poses, so it may have any shape, also several places at once.
+
+Each particle carries its own calibration error of the odometry. The cloud moves once per radio epoch, through the
+pre-integrated increment; readings weigh it with a mixture that forgives outliers; it is resampled systematically when
+fewer than half the particles still count (Thrun, Burgard & Fox 2005, sections 4.3 and 8.3; Kong, Liu & Wong 1994 for
+the effective number). Resampled particles are spread by the kernel of Liu & West (2001), which keeps mean and
+covariance, so that calibration errors, which nothing else moves, do not die out.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from estimators.sampling import Array, judged, mixture, moments, square_root, total_variance
+from fusion import (
+    Covariance,
+    Estimate,
+    Fate,
+    Increment,
+    Measurement,
+    Odometry,
+    ParameterError,
+    Pose,
+    Prior,
+    Ranges,
+    Reason,
+    Tag,
+    WifiScan,
+    World,
+    compose,
+    generator,
+    sightings,
+)
+from fusion.belief import HEADING_KNOWN_STD
+from fusion.screen import unusable
+
+KERNEL = 0.1
+"""Width of the resampling kernel as a share of the cloud's own standard deviation (Liu & West: small, e.g. 0.1)."""
+X, Y, HEADING, DISTANCE_ERROR, TURN_ERROR, TURN_BIAS = range(6)
+"""Rows of the cloud: pose [m, m, rad], relative errors of distance and turn, bias of the turn rate [rad/s]."""
+
+
+class State(NamedTuple):
+    """The cloud at the last radio epoch with its moments, and the motion since; arrays are never written to."""
+
+    time_ns: int
+    seed: int
+    cloud: Array
+    weights: Array
+    pose: Pose
+    covariance: Covariance
+    motion: Increment
+
+
+class Particle:
+    """Particle filter.
+
+    Parameters
+    ----------
+    particles
+        How many; time and memory grow in proportion.
+    outlier_share
+        Share of readings expected to be outliers, in (0, 1).
+    """
+
+    summary: ClassVar[str] = "particle filter with an outlier mixture; starts from anywhere"
+    tags: ClassVar[frozenset[Tag]] = frozenset({Tag.STOCHASTIC, Tag.GLOBAL_START, Tag.HEADING_START})
+
+    def __init__(self, world: World, *, particles: int = 1000, outlier_share: float = 0.05) -> None:
+        if particles < 1:
+            raise ParameterError(f"particle: particles is {particles}; give at least 1")
+        if not 0.0 < outlier_share < 1.0:
+            raise ParameterError(f"particle: outlier_share is {outlier_share}; give a share between 0 and 1")
+        self._world = world
+        self._count = particles
+        self._outlier_share = outlier_share
+
+    def start(self, prior: Prior, seed: int) -> State:
+        """A cloud drawn from the prior; uniform over the floor, or all headings, where that is unknown."""
+        random = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed)))
+        noise, bounds = self._world.robot.noise, self._world.bounds
+        cloud = random.standard_normal((6, self._count))
+        cloud[:3] = np.array(prior.pose)[:, None] + square_root(np.array(prior.covariance.matrix)) @ cloud[:3]
+        calibration = np.array([noise.distance_scale_std, noise.turn_scale_std, noise.turn_bias_std_rad_s])
+        cloud[3:] *= calibration[:, None]
+        if not prior.position_known:
+            cloud[X] = random.uniform(bounds.x_min, bounds.x_max, self._count)
+            cloud[Y] = random.uniform(bounds.y_min, bounds.y_max, self._count)
+        if not prior.heading_known:
+            cloud[HEADING] = random.uniform(-math.pi, math.pi, self._count)
+        weights = np.full(self._count, 1.0 / self._count)
+        return State(prior.time_ns, seed, cloud, weights, *moments(weights, *cloud[:3]), Increment())
+
+    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
+        """Gather motion; at a radio reading move the cloud and weigh it."""
+        if isinstance(measurement, Odometry):
+            motion = state.motion.extend(measurement, self._world.robot.noise)
+            return state._replace(time_ns=measurement.time_ns, motion=motion), ()
+        if isinstance(measurement, WifiScan | Ranges):
+            return self._update(state, measurement)
+        return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+
+    def estimate(self, state: State, time_ns: int) -> Estimate:
+        """Mean and covariance of the cloud, after the motion since the last reading."""
+        pose, covariance = compose(state.pose, state.covariance, state.motion)
+        return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
+
+    def _update(self, state: State, scan: WifiScan | Ranges) -> tuple[State, tuple[Fate, ...]]:
+        random = generator(state.seed, scan)
+        cloud = moved(state.cloud, state.motion, random)
+        pose, covariance = moments(state.weights, *cloud[:3])
+        antenna_m, fates, log_weights = self._world.robot.antenna_m, [], np.log(state.weights)
+        for sighting in sightings(self._world, scan):
+            residual = sighting.value - sighting.expected_values(*cloud[:3], antenna_m)
+            likelihood, good = mixture(residual, total_variance(sighting), self._outlier_share)
+            log_weights = log_weights + np.log(likelihood)
+            share = min(float(state.weights @ good), 1.0)
+            fates.append(judged(scan, sighting, pose, covariance, antenna_m, share))
+        weights = np.exp(log_weights - log_weights.max())
+        weights = np.maximum(weights / weights.sum(), np.finfo(float).tiny)
+        if 1.0 / float(weights @ weights) < 0.5 * self._count:
+            cloud, weights = resampled(cloud, weights, random)
+        moment = moments(weights, *cloud[:3])
+        return State(scan.time_ns, state.seed, cloud, weights, *moment, Increment()), tuple(fates)
+
+
+def moved(cloud: Array, motion: Increment, random: np.random.Generator) -> Array:
+    """The cloud (6, n) after ``motion``, each particle with its own calibration error and its own noise."""
+    if motion.duration_s == 0.0:
+        return cloud
+    shape = Covariance(motion.xx, motion.xy, motion.xh, motion.yy, motion.yh, motion.hh)
+    noise = square_root(np.array(shape.matrix)) @ random.standard_normal((3, cloud.shape[1]))
+    error, bias = cloud[TURN_ERROR], cloud[TURN_BIAS]
+    stretch = 1.0 + cloud[DISTANCE_ERROR]
+    forward = stretch * (motion.x + motion.x_by_scale * error + motion.x_by_bias * bias) + noise[0]
+    left = stretch * (motion.y + motion.y_by_scale * error + motion.y_by_bias * bias) + noise[1]
+    c, s = np.cos(cloud[HEADING]), np.sin(cloud[HEADING])
+    after = cloud.copy()
+    after[X] += c * forward - s * left
+    after[Y] += s * forward + c * left
+    after[HEADING] += motion.heading * (1.0 + error) + motion.duration_s * bias + noise[2]
+    return after
+
+
+def resampled(cloud: Array, weights: Array, random: np.random.Generator) -> tuple[Array, Array]:
+    """As many particles of equal weight: systematic resampling, then the moment-preserving kernel of Liu & West."""
+    count = len(weights)
+    positions = (random.random() + np.arange(count)) / count
+    chosen = np.minimum(np.searchsorted(np.cumsum(weights), positions), count - 1)
+    centre = np.sum(cloud * weights, axis=1)
+    centre[HEADING] = moments(weights, *cloud[:3])[0].heading
+    away = cloud[:, chosen] - centre[:, None]
+    away[HEADING] = np.remainder(away[HEADING] + math.pi, math.tau) - math.pi
+    kernel = square_root(away @ away.T / count) @ random.standard_normal(away.shape)
+    spread = math.sqrt(1.0 - KERNEL**2) * away + KERNEL * kernel
+    return centre[:, None] + spread, np.full(count, 1.0 / count)

@@ -1,0 +1,74 @@
+"""What the filters share that hold their belief as points: the spread of points, and a likelihood that forgives.
+
+The likelihood of a residual is a mixture: (1 - share) of a normal density and a share of a uniform one that is
+`OUTLIER_WIDTH` standard deviations wide, so no reading however far off can rule a place out (Thrun, Burgard & Fox
+2005, section 6.3.1, who mix a measurement model in the same way).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fusion import Covariance, Decision, Fate, Pose, Ranges, Reason, Sighting, WifiScan, wrap_angle
+
+Array = NDArray[np.float64]
+
+OUTLIER_WIDTH = 20.0
+"""Width of the uniform part of the mixture, in standard deviations of the reading."""
+DOUBTED_BELOW = 0.5
+"""A reading counts as down-weighted when it is more likely an outlier than not."""
+
+
+def square_root(covariance: Array) -> Array:
+    """The symmetric square root of a positive semi-definite matrix (n, n); singular ones are welcome, and turning the
+    frame turns the root with it, which Cholesky's factor does not.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
+
+def mixture(residual: Array, variance: Array | float, outlier_share: float) -> tuple[Array, Array]:
+    """Likelihood of each residual up to a constant, and the probability that it is no outlier; any shape."""
+    std = np.sqrt(variance)
+    good = (1.0 - outlier_share) / math.sqrt(math.tau) * np.exp(-0.5 * np.square(residual / std)) / std
+    likelihood = good + outlier_share / (OUTLIER_WIDTH * std)
+    return likelihood, good / likelihood
+
+
+def total_variance(sighting: Sighting) -> float:
+    """Variance of a reading about its expectation: its own noise, and the common error of its anchor."""
+    return float(sighting.variance + sighting.model.bias_std**2)
+
+
+def moments(weights: Array, x: Array, y: Array, heading: Array) -> tuple[Pose, Covariance]:
+    """Weighted mean pose and covariance of points of one shape; the heading's mean is circular (Mardia & Jupp 2000,
+    section 2.2) and its deviations are wrapped.
+    """
+    mean_x, mean_y = float(np.sum(weights * x)), float(np.sum(weights * y))
+    mean_heading = math.atan2(float(np.sum(weights * np.sin(heading))), float(np.sum(weights * np.cos(heading))))
+    dx, dy, turn = x - mean_x, y - mean_y, np.remainder(heading - mean_heading + np.pi, math.tau) - np.pi
+    pairs = ((dx, dx), (dx, dy), (dx, turn), (dy, dy), (dy, turn), (turn, turn))
+    spread = Covariance(*(float(np.sum(weights * one * other)) for one, other in pairs))
+    return Pose(mean_x, mean_y, wrap_angle(mean_heading)), spread
+
+
+def judged(
+    scan: WifiScan | Ranges,
+    sighting: Sighting,
+    pose: Pose,
+    covariance: Covariance,
+    antenna_m: tuple[float, float, float],
+    weight: float,
+) -> Fate:
+    """The Fate of a reading of that ``weight``; its innovation is against the mean ``pose`` before the scan."""
+    expected = sighting.expect(*pose, antenna_m)
+    row = np.array([expected.by_x, expected.by_y, expected.by_heading])
+    innovation = sighting.value - expected.value
+    spread = float(row @ np.array(covariance.matrix) @ row) + total_variance(sighting)
+    doubted = weight < DOUBTED_BELOW
+    verdict = (Decision.DOWNWEIGHTED, Reason.ROBUST_LOSS) if doubted else (Decision.USED, Reason.OK)
+    who = (scan.time_ns, scan.sensor, scan.seq, sighting.anchor.id)
+    return Fate(*who, *verdict, weight, innovation, spread, innovation * innovation / spread)

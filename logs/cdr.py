@@ -1,0 +1,67 @@
+"""Common Data Representation, little-endian: the byte layout of ROS 2 messages (OMG DDS-XTYPES, plain CDR version 1).
+
+A message is four bytes of header, then its fields, each aligned to its own size counted from after that header.
+Strings and sequences carry their length first; a string ends with a zero byte that counts.
+"""
+
+from __future__ import annotations
+
+import struct
+
+HEADER = b"\x00\x01\x00\x00"
+
+
+class Packer:
+    """Builds one message, field by field."""
+
+    def __init__(self) -> None:
+        self._bytes = bytearray()
+
+    def put(self, code: str, *values: float) -> Packer:
+        """Numbers of one type, by their `struct` letter."""
+        size = struct.calcsize("<" + code)
+        self._bytes += b"\0" * (-len(self._bytes) % size)
+        self._bytes += struct.pack(f"<{len(values)}{code}", *values)
+        return self
+
+    def text(self, value: str) -> Packer:
+        """A string."""
+        encoded = value.encode() + b"\0"
+        self.put("I", len(encoded))
+        self._bytes += encoded
+        return self
+
+    def message(self) -> bytes:
+        """The whole message."""
+        return HEADER + bytes(self._bytes)
+
+
+class Unpacker:
+    """Takes one message apart, in the order of its fields; raises `struct.error` or `ValueError` when it is cut off."""
+
+    def __init__(self, message: bytes) -> None:
+        if message[:4] != HEADER:
+            raise ValueError(f"not little-endian CDR: starts with {message[:4].hex()}")
+        self._body = memoryview(message)[4:]
+        self._at = 0
+
+    def take(self, code: str, count: int) -> tuple[float, ...]:
+        """``count`` numbers of one type."""
+        size = struct.calcsize("<" + code)
+        self._at += -self._at % size
+        values = struct.unpack_from(f"<{count}{code}", self._body, self._at)
+        self._at += count * size
+        return values
+
+    def whole(self, code: str = "I") -> int:
+        """One integer."""
+        return int(self.take(code, 1)[0])
+
+    def text(self) -> str:
+        """A string."""
+        length = self.whole()
+        encoded = bytes(self._body[self._at : self._at + length])
+        if len(encoded) != length:
+            raise ValueError("a string is cut off")
+        self._at += length
+        return encoded[:-1].decode()

@@ -1,0 +1,270 @@
+"""The message types of a log and how our values become them and come back.
+
+Standard ROS 2 types where one exists, a few `fusion_msgs` of our own where none does. The stamp holds the time a
+measurement was true, ``frame_id`` the sensor's name, the MCAP sequence number its ``seq``. Numbers are doubles and
+come back to the bit, but for headings that pass through a quaternion.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from fusion import (
+    Covariance,
+    Estimate,
+    Fate,
+    Gyro,
+    Measurement,
+    MotorCommand,
+    Odometry,
+    Pose,
+    Prior,
+    RangeReading,
+    Ranges,
+    RssiReading,
+    Truth,
+    WheelTicks,
+    WifiScan,
+)
+from fusion.values import NANOSECONDS
+from logs.cdr import Packer, Unpacker
+
+SEPARATOR = "=" * 80 + "\n"
+TIME = SEPARATOR + "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+STAMPED = SEPARATOR + "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" + TIME
+VECTOR = SEPARATOR + "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
+QUATERNION = SEPARATOR + "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
+POINT = SEPARATOR + "MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n"
+POSE = SEPARATOR + "MSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n" + POINT + QUATERNION
+
+SCHEMAS = {
+    "fusion_msgs/msg/WheelTicks": "# cumulative encoder counts, in the wheel order of the world\n"
+    "std_msgs/Header header\nint64[] counts\n" + STAMPED,
+    "fusion_msgs/msg/MotorCommand": "# signed wheel speeds [m/s]\n"
+    "std_msgs/Header header\nfloat64[] wheel_speeds_m_s\n" + STAMPED,
+    "fusion_msgs/msg/OdometryIncrement": "# motion over (from_ns, stamp]\nstd_msgs/Header header\n"
+    "int64 from_ns\nfloat64 distance_m\nfloat64 turn_rad\nbool measured\n" + STAMPED,
+    "fusion_msgs/msg/WifiScan": "std_msgs/Header header\nRssiReading[] readings\n" + STAMPED + SEPARATOR
+    + "MSG: fusion_msgs/RssiReading\nstring anchor\nfloat64 rssi_dbm\nint64 age_ns\n",
+    "fusion_msgs/msg/Ranges": "# std_m NaN: the device claims none\n"
+    "std_msgs/Header header\nRangeReading[] readings\n" + STAMPED + SEPARATOR
+    + "MSG: fusion_msgs/RangeReading\nstring anchor\nfloat64 range_m\nfloat64 std_m\n",
+    "fusion_msgs/msg/Fates": "# what became of each reading of one measurement; NaN: no such number\n"
+    "std_msgs/Header header\nFate[] fates\n" + STAMPED + SEPARATOR
+    + "MSG: fusion_msgs/Fate\nstring anchor\nstring decision\nstring reason\nfloat64 weight\nfloat64 innovation\n"
+    "float64 innovation_variance\nfloat64 nis\n",
+    "sensor_msgs/msg/Imu": "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\n"
+    "float64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\n"
+    "float64[9] angular_velocity_covariance\ngeometry_msgs/Vector3 linear_acceleration\n"
+    "float64[9] linear_acceleration_covariance\n" + STAMPED + QUATERNION + VECTOR,
+    "geometry_msgs/msg/PoseStamped": "std_msgs/Header header\nPose pose\n" + STAMPED + POSE,
+    "geometry_msgs/msg/PoseWithCovarianceStamped": "std_msgs/Header header\nPoseWithCovariance pose\n" + STAMPED
+    + SEPARATOR + "MSG: geometry_msgs/PoseWithCovariance\nPose pose\nfloat64[36] covariance\n" + POSE,
+}  # fmt: skip
+"""Definition texts by type name, as the MCAP schema encoding `ros2msg` wants them."""
+
+MAP = "map"
+NOT_GIVEN = -1.0
+"""First element of a covariance that says there is none (the convention of sensor_msgs/Imu)."""
+
+
+def _stamped(time_ns: int, frame_id: str) -> Packer:
+    sec, nanosec = divmod(time_ns, NANOSECONDS)
+    return Packer().put("i", sec).put("I", nanosec).text(frame_id)
+
+
+def _header(cursor: Unpacker) -> tuple[int, str]:
+    sec, nanosec = cursor.whole("i"), cursor.whole("I")
+    return sec * NANOSECONDS + nanosec, cursor.text()
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _put_pose(message: Packer, pose: Pose) -> Packer:
+    half = 0.5 * pose.heading
+    return message.put("d", pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
+
+
+def _take_pose(cursor: Unpacker) -> tuple[Pose, bool]:
+    """The pose and whether it has a heading: an all-zero quaternion is none."""
+    x, y, _, qx, qy, qz, qw = cursor.take("d", 7)
+    heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+    return Pose(x, y, heading), any((qx, qy, qz, qw))
+
+
+def _put_covariance(message: Packer, covariance: Covariance | None) -> Packer:
+    """(x, y, heading) within the 6x6 of (x, y, z, roll, pitch, yaw)."""
+    cells = [0.0] * 36
+    if covariance is None:
+        cells[0] = NOT_GIVEN
+    else:
+        matrix = covariance.matrix
+        for row, big_row in enumerate((0, 1, 5)):
+            for column, big_column in enumerate((0, 1, 5)):
+                cells[6 * big_row + big_column] = matrix[row][column]
+    return message.put("d", *cells)
+
+
+def _take_covariance(cursor: Unpacker) -> Covariance | None:
+    c = cursor.take("d", 36)
+    return None if c[0] == NOT_GIVEN else Covariance(c[0], c[1], c[5], c[7], c[11], c[35])
+
+
+def _encode_ticks(value: WheelTicks) -> bytes:
+    message = _stamped(value.time_ns, value.sensor).put("I", len(value.counts))
+    return (message.put("q", *value.counts) if value.counts else message).message()
+
+
+def _decode_ticks(data: bytes, seq: int) -> WheelTicks:
+    cursor = Unpacker(data)
+    time_ns, sensor = _header(cursor)
+    counts = cursor.take("q", cursor.whole())
+    return WheelTicks(time_ns, sensor, seq, tuple(int(count) for count in counts))
+
+
+def _encode_command(value: MotorCommand) -> bytes:
+    message = _stamped(value.time_ns, value.sensor).put("I", len(value.wheel_speeds_m_s))
+    return (message.put("d", *value.wheel_speeds_m_s) if value.wheel_speeds_m_s else message).message()
+
+
+def _decode_command(data: bytes, seq: int) -> MotorCommand:
+    cursor = Unpacker(data)
+    time_ns, sensor = _header(cursor)
+    return MotorCommand(time_ns, sensor, seq, cursor.take("d", cursor.whole()))
+
+
+def _encode_odometry(value: Odometry) -> bytes:
+    message = _stamped(value.time_ns, value.sensor).put("q", value.from_ns)
+    return message.put("d", value.distance_m, value.turn_rad).put("?", value.measured).message()
+
+
+def _decode_odometry(data: bytes, seq: int) -> Odometry:
+    cursor = Unpacker(data)
+    time_ns, sensor = _header(cursor)
+    from_ns = cursor.whole("q")
+    distance_m, turn_rad = cursor.take("d", 2)
+    return Odometry(time_ns, sensor, seq, from_ns, distance_m, turn_rad, bool(cursor.whole("?")))
+
+
+def _encode_gyro(value: Gyro) -> bytes:
+    no_orientation = (0.0, 0.0, 0.0, 1.0, NOT_GIVEN, *[0.0] * 8)
+    no_acceleration = (0.0, 0.0, 0.0, NOT_GIVEN, *[0.0] * 8)
+    message = _stamped(value.time_ns, value.sensor).put("d", *no_orientation)
+    return message.put("d", 0.0, 0.0, value.rate_rad_s, *[0.0] * 9, *no_acceleration).message()
+
+
+def _decode_gyro(data: bytes, seq: int) -> Gyro:
+    cursor = Unpacker(data)
+    time_ns, sensor = _header(cursor)
+    return Gyro(time_ns, sensor, seq, cursor.take("d", 16)[15])
+
+
+def _encode_scan(value: WifiScan) -> bytes:
+    message = _stamped(value.time_ns, value.sensor).put("I", len(value.readings))
+    for reading in value.readings:
+        message.text(reading.anchor).put("d", reading.rssi_dbm).put("q", reading.age_ns)
+    return message.message()
+
+
+def _decode_scan(data: bytes, seq: int) -> WifiScan:
+    cursor = Unpacker(data)
+    time_ns, sensor = _header(cursor)
+    readings = (RssiReading(cursor.text(), cursor.take("d", 1)[0], cursor.whole("q")) for _ in range(cursor.whole()))
+    return WifiScan(time_ns, sensor, seq, tuple(readings))
+
+
+def _encode_ranges(value: Ranges) -> bytes:
+    message = _stamped(value.time_ns, value.sensor).put("I", len(value.readings))
+    for reading in value.readings:
+        message.text(reading.anchor).put("d", reading.range_m, _number(reading.std_m))
+    return message.message()
+
+
+def _decode_ranges(data: bytes, seq: int) -> Ranges:
+    cursor = Unpacker(data)
+    time_ns, sensor = _header(cursor)
+    readings = []
+    for _ in range(cursor.whole()):
+        anchor, (range_m, std_m) = cursor.text(), cursor.take("d", 2)
+        readings.append(RangeReading(anchor, range_m, None if math.isnan(std_m) else std_m))
+    return Ranges(time_ns, sensor, seq, tuple(readings))
+
+
+class Kind(NamedTuple):
+    """How one type of measurement is stored: topic, message type and both directions."""
+
+    topic: str
+    schema: str
+    encode: Callable[[Any], bytes]
+    decode: Callable[[bytes, int], Measurement]
+
+
+KINDS: dict[type, Kind] = {
+    WheelTicks: Kind("/wheel/ticks", "fusion_msgs/msg/WheelTicks", _encode_ticks, _decode_ticks),
+    MotorCommand: Kind("/wheel/command", "fusion_msgs/msg/MotorCommand", _encode_command, _decode_command),
+    Odometry: Kind("/wheel/odometry", "fusion_msgs/msg/OdometryIncrement", _encode_odometry, _decode_odometry),
+    Gyro: Kind("/imu/raw", "sensor_msgs/msg/Imu", _encode_gyro, _decode_gyro),
+    WifiScan: Kind("/wifi/scan", "fusion_msgs/msg/WifiScan", _encode_scan, _decode_scan),
+    Ranges: Kind("/ranges", "fusion_msgs/msg/Ranges", _encode_ranges, _decode_ranges),
+}
+TRUTH = ("/ground_truth", "geometry_msgs/msg/PoseStamped")
+PRIOR = ("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped")
+ESTIMATE_TOPIC = "/estimate/"
+FATES_TOPIC = "/fates/"
+
+
+def encode_truth(truth: Truth) -> bytes:
+    """Ground truth; an unknown heading is an all-zero quaternion."""
+    message = _stamped(truth.time_ns, MAP)
+    if truth.heading is None:
+        return message.put("d", truth.x, truth.y, *[0.0] * 5).message()
+    return _put_pose(message, Pose(truth.x, truth.y, truth.heading)).message()
+
+
+def decode_truth(data: bytes) -> Truth:
+    """Ground truth from its message."""
+    cursor = Unpacker(data)
+    time_ns, _ = _header(cursor)
+    pose, has_heading = _take_pose(cursor)
+    return Truth(time_ns, pose.x, pose.y, pose.heading if has_heading else None)
+
+
+def encode_prior(prior: Prior) -> bytes:
+    """The starting pose; what of it is unknown is told in the log's metadata."""
+    return _put_covariance(_put_pose(_stamped(prior.time_ns, MAP), prior.pose), prior.covariance).message()
+
+
+def decode_prior(data: bytes, *, position_known: bool, heading_known: bool) -> Prior:
+    """The starting pose from its message and the log's metadata."""
+    cursor = Unpacker(data)
+    time_ns, _ = _header(cursor)
+    pose, has_heading = _take_pose(cursor)
+    covariance = _take_covariance(cursor) or Covariance.from_std(1.0, 1.0, 1.0)
+    return Prior(time_ns, pose, covariance, position_known, heading_known and has_heading)
+
+
+def encode_estimate(estimate: Estimate) -> bytes:
+    """An estimate; one without a covariance says so in its first element."""
+    return _put_covariance(_put_pose(_stamped(estimate.time_ns, MAP), estimate.pose), estimate.covariance).message()
+
+
+def decode_estimate(data: bytes) -> Estimate:
+    """An estimate from its message."""
+    cursor = Unpacker(data)
+    time_ns, _ = _header(cursor)
+    pose, has_heading = _take_pose(cursor)
+    return Estimate(time_ns, pose, _take_covariance(cursor), heading_known=has_heading)
+
+
+def encode_fates(time_ns: int, sensor: str, fates: tuple[Fate, ...]) -> bytes:
+    """What became of the readings of one measurement."""
+    message = _stamped(time_ns, sensor).put("I", len(fates))
+    for fate in fates:
+        message.text(fate.anchor).text(fate.decision.value).text(fate.reason.value)
+        numbers = (fate.innovation, fate.innovation_variance, fate.nis)
+        message.put("d", fate.weight, *map(_number, numbers))
+    return message.message()

@@ -1,0 +1,54 @@
+"""A run as it comes out of a log: the world it happened in, what was measured, where the robot really was."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fusion import Estimate, Measurement, Prior, Truth, World
+
+
+@dataclass(frozen=True, slots=True)
+class TruthTrack:
+    """Ground truth as columns of one length n, in time order: time [ns], x, y [m], heading [rad] (NaN: not known)."""
+
+    time_ns: NDArray[np.int64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    heading: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.time_ns)
+
+    @classmethod
+    def from_truths(cls, truths: Sequence[Truth]) -> TruthTrack:
+        """Columns, read-only, from single truths; of two at one time the first counts."""
+        ordered = sorted(truths, key=lambda truth: truth.time_ns)
+        unique = [truth for i, truth in enumerate(ordered) if i == 0 or truth.time_ns != ordered[i - 1].time_ns]
+        time_ns = np.array([truth.time_ns for truth in unique], dtype=np.int64)
+        x, y = np.array([t.x for t in unique], dtype=np.float64), np.array([t.y for t in unique], dtype=np.float64)
+        heading = np.array([np.nan if t.heading is None else t.heading for t in unique], dtype=np.float64)
+        for column in (time_ns, x, y, heading):
+            column.flags.writeable = False
+        return cls(time_ns, x, y, heading)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One recorded run. ``measurements`` stand in the order they arrived; ``lanes`` holds the estimates of estimators
+    that were replayed into the log, by name.
+    """
+
+    path: Path
+    name: str
+    world: World
+    prior: Prior | None
+    metadata: Mapping[str, str]
+    measurements: tuple[Measurement, ...]
+    truth: TruthTrack | None
+    warnings: tuple[str, ...]
+    lanes: Mapping[str, tuple[Estimate, ...]]

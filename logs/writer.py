@@ -1,0 +1,131 @@
+"""Writes a run as one MCAP file that survives a crash with at most its last second missing.
+
+Profile `ros2`, `ros2msg` schemas and `cdr` messages only, so that every ROS 2 tool opens it. World and metadata go in
+first; a chunk is closed and handed to the operating system every second of log time, and synced to the disk at most
+once a second. The bytes depend on what is written and on nothing else.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType, TracebackType
+from typing import IO
+
+from mcap.writer import Writer
+
+from fusion import LogError, Measurement, Prior, Truth, Update, World
+from fusion.values import nanoseconds
+from logs import messages
+from logs.messages import ESTIMATE_TOPIC, FATES_TOPIC, KINDS, SCHEMAS
+
+RUN_RECORD = "fusion"
+"""Name of the metadata record that makes an MCAP file one of ours."""
+FLUSH_NS = nanoseconds(1.0)
+FATES = "fusion_msgs/msg/Fates"
+
+
+class RunWriter:
+    """One log file, open for writing; a context manager. Not thread-safe: one thread owns it."""
+
+    def __init__(
+        self,
+        path: Path,
+        world: World,
+        *,
+        name: str,
+        prior: Prior | None = None,
+        metadata: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        """Start a log at ``path``; raises `LogError` where it cannot be written."""
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._stream: IO[bytes] = path.open("wb")
+        except OSError as error:
+            raise LogError(f"{path}: cannot be written ({error}); choose another place") from error
+        self._path = path
+        self._writer = Writer(self._stream)
+        self._writer.start(profile="ros2", library="fusion")
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._flushed_ns: int | None = None
+        self._synced_s = time.monotonic()
+        known = {} if prior is None else {"position_known": prior.position_known, "heading_known": prior.heading_known}
+        record = {**metadata, "name": name, "world": world.table, "world_hash": world.hash}
+        self._writer.add_metadata(RUN_RECORD, record | {key: str(value).lower() for key, value in known.items()})
+        self._writer.add_attachment(0, 0, "world.json", "application/json", world.table.encode())
+        for kind in KINDS.values():
+            self._channel(kind.topic, kind.schema)
+        self._channel(*messages.TRUTH)
+        if prior is not None:
+            self._add(*messages.PRIOR, prior.time_ns, prior.time_ns, 0, messages.encode_prior(prior))
+        self._flush()
+
+    def write(self, measurement: Measurement, *, log_time_ns: int | None = None) -> None:
+        """Append a measurement; ``log_time_ns`` says when it arrived, if not when it was true."""
+        kind = KINDS[type(measurement)]
+        log_ns = measurement.time_ns if log_time_ns is None else log_time_ns
+        self._add(kind.topic, kind.schema, log_ns, measurement.time_ns, measurement.seq, kind.encode(measurement))
+
+    def write_truth(self, truth: Truth) -> None:
+        """Append where the robot really was."""
+        self._add(*messages.TRUTH, truth.time_ns, truth.time_ns, 0, messages.encode_truth(truth))
+
+    def write_update(self, lane: str, update: Update) -> None:
+        """Append what an estimator said: its estimate (if valid) and the fates of the readings."""
+        estimate, measurement = update.estimate, update.measurement
+        stamp = estimate.time_ns
+        if estimate.valid:
+            schema = "geometry_msgs/msg/PoseWithCovarianceStamped"
+            self._add(ESTIMATE_TOPIC + lane, schema, stamp, stamp, 0, messages.encode_estimate(estimate))
+        if update.fates:
+            fates = messages.encode_fates(measurement.time_ns, measurement.sensor, update.fates)
+            self._add(FATES_TOPIC + lane, FATES, stamp, measurement.time_ns, measurement.seq, fates)
+
+    def close(self) -> None:
+        """Finish the file; nothing can be written afterwards."""
+        if self._stream.closed:
+            return
+        try:
+            self._writer.finish()  # type: ignore[no-untyped-call]  # mcap leaves it without annotation
+            self._stream.flush()
+            os.fsync(self._stream.fileno())
+        except OSError as error:
+            raise LogError(f"{self._path}: could not be finished ({error}); free some space") from error
+        finally:
+            self._stream.close()
+
+    def __enter__(self) -> RunWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _channel(self, topic: str, schema: str) -> int:
+        if topic not in self._channels:
+            if schema not in self._schemas:
+                self._schemas[schema] = self._writer.register_schema(schema, "ros2msg", SCHEMAS[schema].encode())
+            self._channels[topic] = self._writer.register_channel(topic, "cdr", self._schemas[schema])
+        return self._channels[topic]
+
+    def _add(self, topic: str, schema: str, log_ns: int, stamp_ns: int, seq: int, data: bytes) -> None:
+        if log_ns < 0 or stamp_ns < 0:
+            raise LogError(f"{self._path}: {topic} at {stamp_ns} ns lies before time zero; shift the run's clock")
+        try:
+            self._writer.add_message(self._channel(topic, schema), log_ns, data, stamp_ns, seq & 0xFFFFFFFF)
+            if self._flushed_ns is None or log_ns - self._flushed_ns >= FLUSH_NS:
+                self._flushed_ns = log_ns
+                self._flush()
+        except OSError as error:
+            raise LogError(f"{self._path}: could not be written ({error}); free some space") from error
+
+    def _flush(self) -> None:
+        self._writer.flush()  # type: ignore[no-untyped-call]  # mcap leaves it without annotation
+        self._stream.flush()
+        if time.monotonic() - self._synced_s >= 1.0:
+            os.fsync(self._stream.fileno())
+            self._synced_s = time.monotonic()

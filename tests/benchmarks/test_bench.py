@@ -1,0 +1,232 @@
+"""The bench on small logs: what is refused, what is survived, what is reported."""
+
+import json
+import math
+import operator
+import os
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import fusion
+from benchmarks.bench import bench, parse_settings, pooled, remarks, write_records
+from benchmarks.cell import Score
+from benchmarks.lane import run_lane
+from benchmarks.prior import starting_prior
+from benchmarks.table import print_tables, ranked
+from benchmarks.workers import compute
+from fusion import Covariance, Decision, Estimate, LogError, Odometry, ParameterError, PluginError, Pose, Prior, Truth
+from logs.run import Run, TruthTrack
+from logs.writer import RunWriter
+
+TENTH_NS = 100_000_000
+WORLD = fusion.World.from_table({"name": "corridor", "bounds": {"x_min": 0, "x_max": 8, "y_min": -1, "y_max": 3}})
+
+
+class Belief(NamedTuple):
+    pose: Pose
+    time_ns: int
+    steps: int = 0
+
+
+class Wheels:
+    """Believes the wheels, with an error of ``shift_m`` in x."""
+
+    summary = "odometry alone"
+    tags = frozenset()
+
+    def __init__(self, world, shift_m: float = 0.0):
+        self.shift_m = shift_m
+
+    def start(self, prior, seed):
+        return Belief(prior.pose, prior.time_ns)
+
+    def step(self, state, measurement):
+        moved = state.pose
+        if isinstance(measurement, Odometry):
+            moved = moved.compose(Pose(measurement.distance_m, 0.0, measurement.turn_rad))
+        return Belief(moved, measurement.time_ns, state.steps + 1), ()
+
+    def estimate(self, state, time_ns):
+        x, y, heading = state.pose
+        return Estimate(time_ns, Pose(x + self.shift_m, y, heading), Covariance.from_std(0.1, 0.1, 0.1))
+
+
+class Dies(Wheels):
+    def step(self, state, measurement):
+        if state.steps == 30:
+            raise ZeroDivisionError("half way")
+        return super().step(state, measurement)
+
+
+class Quiet(Wheels):
+    def estimate(self, state, time_ns):
+        return super().estimate(state, time_ns)._replace(valid=state.steps < 20)
+
+
+class Diverges(Wheels):
+    def estimate(self, state, time_ns):
+        return super().estimate(state, time_ns)._replace(pose=Pose(math.nan, 0.0, 0.0))
+
+
+@pytest.fixture(autouse=True)
+def _estimators():
+    with (
+        fusion.registered("toy_wheels", Wheels),
+        fusion.registered("toy_dies", Dies),
+        fusion.registered("toy_quiet", Quiet),
+        fusion.registered("toy_diverges", Diverges),
+    ):
+        yield
+
+
+def write_run(path, *, truth=True, steps=50):
+    with RunWriter(path, WORLD, name=path.stem) as writer:
+        for k in range(steps + 1):
+            if truth:
+                writer.write_truth(Truth(k * TENTH_NS, 0.1 * k, 0.0, 0.0))
+            if k:
+                writer.write(Odometry(k * TENTH_NS, "wheels", k, (k - 1) * TENTH_NS, 0.1, 0.0))
+    return path
+
+
+def run_in_memory(**changes):
+    odometry = tuple(Odometry(k * TENTH_NS, "wheels", k, (k - 1) * TENTH_NS, 0.1, 0.0) for k in range(3, 60))
+    track = TruthTrack(np.arange(60) * TENTH_NS, np.arange(60) * 0.1, np.zeros(60), np.zeros(60))
+    fields = {"path": None, "name": "run", "world": WORLD, "prior": None, "metadata": {}, "measurements": odometry}
+    return Run(**{**fields, "truth": track, "warnings": (), "lanes": {}, **changes})
+
+
+def test_perfect_wheels_score_zero_and_a_shift_scores_itself(tmp_path):
+    log = write_run(tmp_path / "run.mcap")
+    perfect, shifted = (
+        bench([log], estimators=["toy_wheels"], settings={"toy_wheels": {"shift_m": shift}}, workers=1)[0]
+        for shift in (0.0, 0.25)
+    )
+    assert perfect.status == "ok"
+    assert perfect.metrics["pos_max"] == pytest.approx(0.0, abs=1e-9)
+    assert shifted.metrics["pos_p75"] == pytest.approx(0.25, rel=1e-9)
+    assert shifted.metrics["anees_2d"] == pytest.approx(0.25**2 / 0.1**2 / 2.0, rel=1e-9)
+
+
+def test_dead_and_diverged_estimators_rank_below_a_poor_one_that_lives(tmp_path):
+    log = write_run(tmp_path / "run.mcap")
+    scores = bench(
+        [log],
+        estimators=["toy_dies", "toy_quiet", "toy_diverges", "toy_wheels"],
+        settings={"toy_wheels": {"shift_m": 100.0}},
+        workers=1,
+    )
+    status = {score.estimator: score.status for score in scores}
+    assert status == {
+        "toy_wheels": "ok",
+        "toy_quiet": "diverged",
+        "toy_diverges": "diverged",
+        "toy_dies": "crashed",
+    }
+    assert ranked(scores)[0].estimator == "toy_wheels"
+    assert ranked(scores)[-1].estimator == "toy_dies"
+    assert [score.estimator for score in ranked(pooled(scores))] == [score.estimator for score in ranked(scores)]
+
+
+def test_half_a_run_before_a_crash_is_no_result(tmp_path):
+    (score,) = bench([write_run(tmp_path / "run.mcap")], estimators=["toy_dies"], workers=1)
+    assert "half way" in score.error
+    assert score.metrics["availability"] == 0.0
+    assert score.record()["pos_p50"] is None
+
+
+def test_records_are_strict_json_with_flat_metrics(tmp_path):
+    scores = bench([write_run(tmp_path / "run.mcap")], estimators=["toy_wheels", "toy_quiet"], workers=1, seed=4)
+    write_records(scores, tmp_path / "new" / "scores.json")
+    text = (tmp_path / "new" / "scores.json").read_text()
+    good, quiet = json.loads(text, parse_constant=pytest.fail)
+    assert (good["run"], good["estimator"], good["status"], good["seed"]) == ("run", "toy_wheels", "ok", 4)
+    assert good["world_hash"] == WORLD.hash
+    assert len(good["digest"]) == 64
+    assert set(good["fates"]) == {decision.value for decision in Decision}
+    assert quiet["pos_p75"] is None
+    assert quiet["status"] == "diverged"
+
+
+def test_log_without_truth_says_so_and_reports_the_rest(tmp_path, capsys):
+    scores = bench([write_run(tmp_path / "run.mcap", truth=False)], estimators=["toy_wheels"], workers=1)
+    assert scores[0].status == "unscored"
+    assert scores[0].record()["digest"]
+    assert [remark for remark in remarks(scores) if "no ground truth" in remark]
+    print_tables(scores, pooled(scores))
+    assert "toy_wheels" in capsys.readouterr().out
+
+
+def test_pooled_figures_take_all_instants_of_all_runs(tmp_path):
+    runs = [write_run(tmp_path / "short.mcap", steps=10), write_run(tmp_path / "long.mcap", steps=50)]
+    (together,) = pooled(bench(runs, estimators=["toy_wheels"], workers=1))
+    assert together.metrics["n"] == 11.0 + 51.0
+
+
+def test_table_is_in_centimetres_and_names_the_status(tmp_path, capsys):
+    log = write_run(tmp_path / "run.mcap")
+    scores = bench([log], estimators=["toy_wheels", "toy_dies"], settings={"toy_wheels": {"shift_m": 0.25}}, workers=1)
+    print_tables(scores, pooled(scores))
+    table = capsys.readouterr().out
+    assert "25.0" in table
+    assert "toy_dies (crashed)" in table
+    assert "∞" in table
+
+
+def test_what_is_misspelt_is_refused_before_any_work(tmp_path):
+    log = write_run(tmp_path / "run.mcap")
+    with pytest.raises(PluginError, match="did you mean 'toy_wheels'"):
+        bench([log], estimators=["toy_weels"])
+    with pytest.raises(ParameterError, match="did you mean 'shift_m'"):
+        bench([log], estimators=["toy_wheels"], settings={"toy_wheels": {"shift": 1.0}})
+    with pytest.raises(ParameterError, match="not benched"):
+        bench([log], estimators=["toy_wheels"], settings={"toy_dies": {"shift_m": 1.0}})
+    with pytest.raises(LogError, match=r"nothing\.mcap: no such file"):
+        bench([tmp_path / "nothing.mcap"], estimators=["toy_wheels"])
+    with pytest.raises(ParameterError, match=r"ESTIMATOR\.PARAMETER=VALUE"):
+        parse_settings(["gate=0.99"])
+
+
+def test_same_cell_twice_gives_the_same_digest(tmp_path):
+    log = write_run(tmp_path / "run.mcap")
+    first, second = (bench([log], estimators=["toy_wheels"], workers=1)[0].facts["digest"] for _ in range(2))
+    assert first == second
+
+
+def test_lane_keeps_what_was_said_before_the_crash():
+    lane = run_lane(run_in_memory(), "toy_dies")
+    assert len(lane.updates) == 30
+    assert "half way" in lane.error
+    assert len(lane.final) == 30
+
+
+def test_prior_of_the_log_goes_before_the_truth_and_the_truth_before_nothing():
+    known = Prior(5, Pose(1.0, 2.0, 3.0), Covariance.from_std(1.0, 1.0, 1.0))
+    assert starting_prior(run_in_memory(prior=known)) is known
+    from_truth = starting_prior(run_in_memory())
+    assert (from_truth.time_ns, from_truth.pose) == (2 * TENTH_NS, Pose(0.2, 0.0, 0.0))
+    nothing = starting_prior(run_in_memory(truth=None))
+    assert nothing.pose == Pose(4.0, 1.0, 0.0)
+    assert not nothing.position_known
+    assert not nothing.heading_known
+
+
+def test_prior_from_truth_without_heading_leaves_the_heading_unknown():
+    blind = TruthTrack(np.array([0]), np.array([1.0]), np.array([2.0]), np.array([math.nan]))
+    prior = starting_prior(run_in_memory(truth=blind))
+    assert prior.position_known
+    assert not prior.heading_known
+    assert prior.pose == Pose(1.0, 2.0, 0.0)
+
+
+def test_a_worker_that_dies_costs_its_own_cell_only():
+    tasks = [partial(pow, 2, 1), partial(pow, 2, 2), partial(os._exit, 1), partial(pow, 2, 4), partial(pow, 2, 5)]
+    results = dict(compute(operator.call, lambda task: f"lost {task.args}", tasks, workers=2))
+    assert [results[index] for index in range(5)] == [2, 4, "lost (1,)", 16, 32]
+
+
+def test_unscored_record_has_no_metrics():
+    assert "pos_p50" not in Score("run", "toy", "unscored").record()

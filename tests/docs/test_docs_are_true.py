@@ -1,0 +1,45 @@
+"""Every Python block of README and docs runs, page by page; the world file of the docs loads."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from fusion import World
+from fusion.cli import VERBS
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+
+
+def blocks(page, language):
+    return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_python_of_a_page_runs_from_top_to_bottom(page):
+    source = "\n".join(blocks(page, "python"))
+    exec(compile(source, str(page), "exec"), {"__name__": "docs"})
+
+
+def test_world_file_of_the_docs_loads_and_states_the_defaults():
+    (text,) = blocks(ROOT / "docs" / "world.md", "toml")
+    world = World.from_toml(text)
+    assert [anchor.id for anchor in world.anchors] == ["ap1", "ap2", "ap3"]
+    assert world.anchor("ap3").ranging.offset_m == 0.12
+    bare = World.from_table({"anchors": [{"id": "a", "position_m": [0, 0]}]})
+    assert world.robot.noise == bare.robot.noise
+    assert world.anchor("ap1").radio == bare.anchors[0].radio
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_command_shown_exists(page):
+    for line in "\n".join(blocks(page, "sh")).splitlines():
+        for verb in re.findall(r"(?:^|; |: )fusion (\w+)", line.partition("#")[0]):
+            assert verb in VERBS, line
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_page_linked_to_exists(page):
+    for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), target
