@@ -79,7 +79,11 @@ def cached_run(path: Path) -> Run:
 def score_cell(cell: Cell) -> Score:
     """Run the estimator and judge it. Raises `LogError` for the log; what the estimator does is in the score."""
     run = cached_run(cell.path)
-    lane = run_lane(run, cell.estimator, cell.options, cell.seed)
+    return score_lane(cell, run, run_lane(run, cell.estimator, cell.options, cell.seed))
+
+
+def score_lane(cell: Cell, run: Run, lane: Lane) -> Score:
+    """The score of a lane that was already run."""
     measured = _errors(run, lane)
     status = _status(lane, measured)
     return Score(run.name, cell.estimator, status, lane.error, measured, {**_facts(cell, run), **_cost(run, lane)})

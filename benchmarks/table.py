@@ -72,11 +72,12 @@ def _table(title: str, scores: Sequence[Score]) -> Table:
     for score in ranked(scores):
         remark = "" if score.status in ("ok", "unscored") else f" ({score.status})"
         values = {**score.facts, **score.metrics}
-        table.add_row(score.estimator + remark, *(_cell(column, values) for column in COLUMNS))
+        table.add_row(score.estimator + remark, *(as_text(column, values) for column in COLUMNS))
     return table
 
 
-def _cell(column: Column, values: Mapping[str, object]) -> str:
+def as_text(column: Column, values: Mapping[str, object]) -> str:
+    """A number as people read it: – where there is none."""
     value = values.get(column.key)
     if not isinstance(value, float) or math.isnan(value):
         return "–"

@@ -1,14 +1,16 @@
 """filterpy's extended Kalman filter behind our contract: a baseline everybody knows.
 
-The filter object of filterpy lives for one call: the belief is copied in, predicted or updated, and copied out, so the
-state stays a value. Time, gate and Fates are ours; filterpy has none of them. `estimators/filterpy_ukf.py` differs
-only in how a belief is predicted and compared with readings.
+filterpy's object lives for one call: the belief is copied in, predicted or updated, and copied out, so the state stays
+a value. Time, gate and Fates are ours; filterpy has none of them. All readings of a scan enter in one update, those
+beyond the gate left out, so their order does not matter. `estimators/filterpy_ukf.py` differs only in how a belief is
+predicted and compared with readings.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -33,12 +35,13 @@ from fusion import (
     Tag,
     WifiScan,
     World,
-    compose,
     sightings,
     wrap_angle,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.screen import unusable
+
+Readings = tuple[Sighting, ...]
 
 
 class State(NamedTuple):
@@ -50,46 +53,137 @@ class State(NamedTuple):
     motion: Increment
 
 
-class Comparison(NamedTuple):
-    """Readings beside the belief before the scan: innovations (m,), their covariance without the readings' own noise
-    (m, m), and the readings' variances (m,).
-    """
-
-    innovation: Array
-    covariance: Array
-    variance: Array
-
-
 class FilterpyFilter(ABC):
-    """The contract kept for a Gaussian filter of filterpy, which a subclass names and feeds."""
+    """The contract, kept for any Gaussian filter of filterpy; a subclass says how it predicts and updates."""
 
     tags: ClassVar[frozenset[Tag]] = frozenset({Tag.HEADING_START})
 
     def __init__(self, world: World, *, gate_probability: float = 0.999) -> None:
         if not 0.0 < gate_probability <= 1.0:
             raise ParameterError(f"filterpy: gate_probability is {gate_probability}; give a probability in (0, 1]")
-        try:
-            import filterpy.kalman
-        except ImportError as error:
-            raise PluginError(
-                f"filterpy cannot be imported ({error}); pip install fusion-localization[filterpy]"
-            ) from error
-        self._kalman = filterpy.kalman.__name__
+        filterpy_kalman()
         self._world = world
         self._gate = chi_square_gate(gate_probability)
 
     @abstractmethod
     def _predicted(self, state: State) -> Any:  # noqa: ANN401 - filterpy is not typed
-        """filterpy's filter with the belief of ``state``, moved by the pending motion."""
+        """The filter of filterpy with the belief of ``state``, moved by its pending motion."""
 
     @abstractmethod
-    def _update(self, belief: Any, readings: tuple[Sighting, ...]) -> None:  # noqa: ANN401
-        """Bring all readings into filterpy's filter at once."""
+    def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
+        """What ``belief`` expects of each reading, and how uncertain it is of that; both (m,)."""
 
     @abstractmethod
-    def _compare(self, belief: Any, readings: tuple[Sighting, ...]) -> Comparison:  # noqa: ANN401
-        """The readings beside what the filter expects of them."""
+    def _correct(self, belief: Any, readings: Readings) -> None:  # noqa: ANN401
+        """Bring all ``readings`` into ``belief`` by one update of filterpy."""
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
-        """The prior."""
+        """The prior; what is unknown gets the moments of a uniform distribution."""
         return State(prior.time_ns, *starting_belief(self._world, prior), Increment())
+
+    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
+        """Gather motion; at a radio reading predict and update."""
+        if isinstance(measurement, Odometry):
+            motion = state.motion.extend(measurement, self._world.robot.noise)
+            return state._replace(time_ns=measurement.time_ns, motion=motion), ()
+        if isinstance(measurement, WifiScan | Ranges):
+            return self._update(state, measurement)
+        return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+
+    def estimate(self, state: State, time_ns: int) -> Estimate:
+        """The pose after the motion since the last reading."""
+        pose, covariance = state.pose, state.covariance
+        if state.motion.duration_s > 0.0:
+            pose, covariance = copied_out(self._predicted(state))
+        return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
+
+    def _update(self, state: State, scan: WifiScan | Ranges) -> tuple[State, tuple[Fate, ...]]:
+        belief, readings = self._predicted(state), sightings(self._world, scan)
+        values, variances = self._expected(belief, readings)
+        fates, used = [], []
+        for sighting, value, variance in zip(readings, values.tolist(), variances.tolist(), strict=True):
+            innovation, spread = sighting.value - value, variance + total_variance(sighting)
+            nis = innovation * innovation / spread
+            taken = nis <= self._gate
+            if taken:
+                used.append(sighting)
+            verdict = (Decision.USED, Reason.OK, 1.0) if taken else (Decision.REJECTED, Reason.GATE, 0.0)
+            who = (scan.time_ns, scan.sensor, scan.seq, sighting.anchor.id)
+            fates.append(Fate(*who, *verdict, innovation, spread, nis))
+        if used:
+            self._correct(belief, tuple(used))
+        return State(scan.time_ns, *copied_out(belief), Increment()), tuple(fates)
+
+
+class FilterpyEkf(FilterpyFilter):
+    """The ``ExtendedKalmanFilter`` of filterpy.
+
+    Parameters
+    ----------
+    gate_probability
+        A reading is refused when its normalised innovation squared is beyond this quantile of chi-square with one
+        degree of freedom. 1.0 takes every reading.
+    """
+
+    summary: ClassVar[str] = "extended Kalman filter of filterpy"
+
+    def _predicted(self, state: State) -> Any:  # noqa: ANN401
+        """The motion's Jacobian A as filterpy's F, and what it leaves of the motion as filterpy's control input."""
+        belief = filterpy_kalman().ExtendedKalmanFilter(dim_x=3, dim_z=1)
+        belief.x, belief.P = np.array(state.pose), np.array(state.covariance.matrix)
+        moved = away(belief.x, state.motion)
+        dx, dy, _ = moved - belief.x
+        belief.F = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])
+        belief.B, belief.Q = np.eye(3), motion_noise(state)
+        belief.predict(u=moved - belief.F @ belief.x)
+        return belief
+
+    def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
+        values, jacobian = self._linearised(belief.x, readings)
+        return values, np.einsum("mi,ij,mj->m", jacobian, belief.P, jacobian)
+
+    def _correct(self, belief: Any, readings: Readings) -> None:  # noqa: ANN401
+        values, jacobian = self._linearised(belief.x, readings)
+        variances = np.diag([total_variance(sighting) for sighting in readings])
+        seen = np.array([sighting.value for sighting in readings])
+        belief.update(seen, lambda _: jacobian, lambda _: values, R=variances)
+
+    def _linearised(self, x: Array, readings: Readings) -> tuple[Array, Array]:
+        """Expected readings (m,) and their Jacobian (m, 3) at the pose ``x``."""
+        px, py, heading = x.tolist()
+        expected = [sighting.expect(px, py, heading, self._world.robot.antenna_m) for sighting in readings]
+        rows = [(e.by_x, e.by_y, e.by_heading) for e in expected]
+        return np.array([e.value for e in expected]), np.array(rows).reshape(-1, 3)
+
+
+def filterpy_kalman() -> ModuleType:
+    """The Kalman filters of filterpy; raises `PluginError` where filterpy is not installed. Imported when used: 0.8 s."""
+    try:
+        import filterpy.kalman
+    except ImportError as error:
+        remedy = "pip install fusion-localization[filterpy]"
+        raise PluginError(f"filterpy cannot be imported ({error}); {remedy}") from error
+    module: ModuleType = filterpy.kalman
+    return module
+
+
+def away(x: Array, motion: Increment) -> Array:
+    """The pose ``x`` (3,) after ``motion``; the heading is not wrapped, so that differences of poses stay plain."""
+    c, s = math.cos(x[2]), math.sin(x[2])
+    return np.asarray(x + np.array([c * motion.x - s * motion.y, s * motion.x + c * motion.y, motion.heading]))
+
+
+def motion_noise(state: State) -> Array:
+    """Q = B C Bᵀ, the noise of the pending motion turned into the map frame (see `fusion.compose`)."""
+    motion = state.motion
+    c, s = math.cos(state.pose.heading), math.sin(state.pose.heading)
+    turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    own = Covariance(motion.xx, motion.xy, motion.xh, motion.yy, motion.yh, motion.hh)
+    return np.asarray(turned @ np.array(own.matrix) @ turned.T)
+
+
+def copied_out(belief: Any) -> tuple[Pose, Covariance]:  # noqa: ANN401
+    """Pose and covariance of filterpy's filter, the heading wrapped."""
+    x, y, heading = np.ravel(belief.x).tolist()
+    p = (0.5 * (belief.P + belief.P.T)).tolist()
+    return Pose(x, y, wrap_angle(heading)), Covariance(p[0][0], p[0][1], p[0][2], p[1][1], p[1][2], p[2][2])

@@ -114,7 +114,7 @@ class Particle:
         pose, covariance = moments(state.weights, *cloud[:3])
         antenna_m, fates, log_weights = self._world.robot.antenna_m, [], np.log(state.weights)
         for sighting in sightings(self._world, scan):
-            residual = sighting.value - sighting.expected_values(*cloud[:3], antenna_m)
+            residual = sighting.value - sighting.expected_values(cloud[X], cloud[Y], cloud[HEADING], antenna_m)
             likelihood, good = mixture(residual, total_variance(sighting), self._outlier_share)
             log_weights = log_weights + np.log(likelihood)
             share = min(float(state.weights @ good), 1.0)

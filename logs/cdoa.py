@@ -8,6 +8,7 @@ was commanded. Each row holds the last value of everything, so positions may be 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -41,7 +42,7 @@ FROZEN_M = 0.02
 
 
 def recordings(folder: Path) -> Iterator[Recording]:
-    """One run for every ``combined_sync_data_*.csv``; runs without a reading of three nodes are left out."""
+    """One run for every ``combined_sync_data_*.csv``, however short."""
     files = sorted(folder.rglob("combined_sync_data_*.csv"))
     if not files:
         raise RecordingError(f"{folder}: no combined_sync_data_*.csv; give a folder of CDOA runs")
@@ -52,13 +53,15 @@ def recordings(folder: Path) -> Iterator[Recording]:
 def _recording(path: Path) -> Recording:
     wanted = ["temp_sec", "temp_nsec", "robot_odom_x", "robot_pos_x", "robot_pos_y", "vel_w", "status4"]
     rows = list(read_table(path, wanted))
-    whole = [row for row in rows if row.text("status4")]
+    whole = [row for row in rows if _is_whole(row)]
+    if not whole:
+        raise RecordingError(f"{path}: no whole row beside the header; give a whole file")
     odometry, truths = _odometry(whole), _truths(whole)
     scans = [scan for i, row in enumerate(whole) if (scan := _scan(i, row)).readings]
     prior, how = prior_from_truth(odometry, truths, path_m=START_PATH_M)
     about = {"source": "cdoa", "licence": "MIT, HeRoLab UGA", "prior": how}
     if len(whole) < len(rows):
-        about["skipped"] = f"{len(rows) - len(whole)} rows cut off"
+        about["skipped"] = f"{len(rows) - len(whole)} rows cut off or without a number"
     name = f"{path.parent.name}-{path.stem.removeprefix('combined_sync_data_')}"
     return Recording(name, _world(name), prior, [*odometry, *scans], truths, about)
 
@@ -89,8 +92,14 @@ def _world(name: str) -> World:
     )
 
 
+def _is_whole(row: Row) -> bool:
+    """Whether a row reaches its last column and its motion and truth are numbers."""
+    columns = ("robot_odom_x", "robot_pos_x", "robot_pos_y", "vel_w")
+    return bool(row.text("status4")) and all(math.isfinite(row.number(column)) for column in columns)
+
+
 def _time_ns(row: Row) -> int:
-    return int(row.number("temp_sec")) * NANOSECONDS + int(row.number("temp_nsec"))
+    return row.whole("temp_sec") * NANOSECONDS + row.whole("temp_nsec")
 
 
 def _odometry(rows: Sequence[Row]) -> list[Odometry]:

@@ -59,7 +59,7 @@ def _ticks(folder: Path) -> list[WheelTicks]:
     rows = _rows(folder, "ticks.csv", "time_s")
     return [
         WheelTicks(
-            row.time_ns("time_s"), "ticks", i, tuple(int(row.number(name)) for name in row.cells if name != "time_s")
+            row.time_ns("time_s"), "ticks", i, tuple(row.whole(name) for name in row.cells if name and name != "time_s")
         )
         for i, row in enumerate(rows)
     ]

@@ -71,15 +71,15 @@ def _truth(time_ns: int, row: Row, column: str) -> Truth:
 def _readings(
     time_ns: int, seq: int, row: Row, before: Row | None, anchors: Sequence[str]
 ) -> Iterator[Ranges | WifiScan]:
-    """What was newly measured in one row."""
+    """What was newly measured in one row. Ranges have ten digits, so an equal one was held; whole dBm may repeat."""
     ranges, rssi = [], []
     for anchor in anchors:
         columns = [f"{anchor} RTT Distance (m)", f"{anchor} RSS (dBm)"]
-        held = before is not None and all(row.text(name) == before.text(name) for name in columns)
+        far_held, strength_held = (before is not None and row.text(name) == before.text(name) for name in columns)
         far, strength = (row.number(name) if row.text(name) else 0.0 for name in columns)
-        if far != 0.0 and not held:
+        if far != 0.0 and not far_held:
             ranges.append(RangeReading(anchor, far))
-        if strength != 0.0 and not held:
+        if strength != 0.0 and not (far_held and strength_held):
             rssi.append(RssiReading(anchor, strength))
     if ranges:
         yield Ranges(time_ns, "rtt", seq, tuple(ranges))

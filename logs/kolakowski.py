@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from fusion import Odometry, Pose, RecordingError, RssiReading, Truth, WifiScan, World
-from fusion.values import nanoseconds, seconds
+from fusion.values import NANOSECONDS, nanoseconds, seconds
 from logs.recording import Recording, Row, exact_ns, prior_from_truth, read_table
 
 FLAT_FROM_MAPPING = Pose(0.46076947, 6.34292452, math.radians(179.0))
@@ -54,7 +54,7 @@ LAST_GOOD_NS = 1628001747456333000
 
 
 def recordings(folder: Path) -> Iterator[Recording]:
-    """One run for every ``*_df.csv`` with its ``*_motion.txt``."""
+    """One run for every ``*_df.csv`` with its ``*_motion.txt``, if there is one."""
     files = sorted(folder.rglob("*_df.csv"))
     if not files:
         raise RecordingError(f"{folder}: no *_df.csv; give the folder of the BLE data set")
@@ -74,15 +74,17 @@ def _recording(path: Path, anchors: Path) -> Recording:
     truths = [_truth(row) for row in rows]
     scans = [scan for i, row in enumerate(rows) if (scan := _scan(i, row)).readings]
     motion = path.with_name(path.name.replace("_df.csv", "_motion.txt"))
-    odometry = _odometry(motion, truths[0].time_ns, truths[-1].time_ns)
+    odometry = _odometry(motion, truths[0].time_ns, truths[-1].time_ns) if motion.is_file() else []
     prior, how = prior_from_truth(odometry, truths)
     name = path.name.removesuffix("_df.csv")
     about = {"source": "kolakowski", "licence": "CC BY 4.0, M. Kolakowski, doi 10.3390/s21186270", "prior": how}
-    return Recording(name, _world(name, anchors), prior, [*odometry, *scans], truths, about)
+    return Recording(
+        name, _world(name, anchors, "differential" if odometry else "none"), prior, [*odometry, *scans], truths, about
+    )
 
 
 def _time_ns(row: Row) -> int:
-    return exact_ns(row.text("ts")) // 1_000_000_000
+    return row.time_ns("ts") // NANOSECONDS
 
 
 def _truth(row: Row) -> Truth:
@@ -126,11 +128,11 @@ def _commands(path: Path) -> list[tuple[int, str]]:
             continue
         if len(parts) < 2 or parts[1] not in SPEEDS:
             raise RecordingError(f"{path}:{number}: {line!r} is no command; expected time,{'|'.join(SPEEDS)},speed")
-        found.append((exact_ns(parts[0]), parts[1]))
+        found.append((exact_ns(parts[0], f"{path}:{number}"), parts[1]))
     return found
 
 
-def _world(name: str, path: Path) -> World:
+def _world(name: str, path: Path, drive: str) -> World:
     anchors = []
     for row in read_table(path, ["id", "x", "y", "z"]):
         anchor = row.text("id")
@@ -148,6 +150,6 @@ def _world(name: str, path: Path) -> World:
             "name": name,
             "provenance": "path loss and command speeds were fitted on calibration runs 1 to 3 (in-sample there)",
             "anchors": anchors,
-            "robot": {"drive": "differential", "antenna_m": list(TAG_ON_ROBOT_M), "noise": NOISE},
+            "robot": {"drive": drive, "antenna_m": list(TAG_ON_ROBOT_M), "noise": NOISE},
         }
     )

@@ -49,13 +49,16 @@ class Recording:
         return path
 
 
-def exact_ns(text: str) -> int:
-    """Seconds written as decimal text, in nanoseconds, without passing through a float.
+def exact_ns(text: str, place: str = "recording") -> int:
+    """Seconds written as decimal text, in nanoseconds, without passing through a float; raises `RecordingError`.
 
     >>> exact_ns("1652380260.171842098")
     1652380260171842098
     """
-    return int((Decimal(text) * NANOSECONDS).to_integral_value())
+    try:
+        return int((Decimal(text) * NANOSECONDS).to_integral_value())
+    except (InvalidOperation, ValueError, OverflowError) as error:
+        raise RecordingError(f"{place}: {text!r} is not a time in seconds; correct it") from error
 
 
 @dataclass(frozen=True)
@@ -80,10 +83,14 @@ class Row:
 
     def time_ns(self, column: str) -> int:
         """A cell holding seconds, in nanoseconds."""
-        try:
-            return exact_ns(self.text(column))
-        except (InvalidOperation, ValueError, OverflowError) as error:
-            raise RecordingError(f"{self.place}: {column} is {self.text(column)!r}, not a time in seconds") from error
+        return exact_ns(self.text(column), f"{self.place}: {column}")
+
+    def whole(self, column: str) -> int:
+        """A cell as a whole number; raises `RecordingError` naming the place."""
+        number = self.number(column)
+        if not number.is_integer():
+            raise RecordingError(f"{self.place}: {column} is {self.text(column)!r}, not a whole number; correct it")
+        return int(number)
 
 
 def read_table(path: Path, required: Sequence[str]) -> Iterator[Row]:

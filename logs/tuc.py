@@ -15,7 +15,7 @@ from logs.recording import Recording, exact_ns, prior_from_truth
 
 TRACK_WIDTH_M = 0.157
 WHOLE_RUN_M = 1e9
-"""The start heading is the best fit over the whole run, as in the publisher's own evaluation."""
+"""The start heading is the best fit over the whole run, so dead reckoning there is in-sample."""
 RANGING = {"offset_m": 0.118, "std_m": 0.12}
 NOISE = {
     # 0.05 of a step of 0.05 m and 5 degrees, as variance per metre and per radian
@@ -42,7 +42,9 @@ def _recording(path: Path) -> Recording:
     ranges = []
     for i, (place, row) in enumerate(item for item in rows if item[1][0] == "range2"):
         far, x, y = _numbers(place, row, 2, 4, 5)
-        time_ns = exact_ns(row[1])
+        time_ns = exact_ns(row[1], place)
+        if len(row) < 7:
+            raise RecordingError(f"{place}: {' '.join(row)!r} names no module; a range2 row has eight columns")
         anchors[row[6]] = (x, y)
         ranges.append(Ranges(time_ns, "uwb", i, (RangeReading(row[6], far),)))
     odometry = _odometry(path, [row for row in rows if row[1][0] == "odom2diff"])
@@ -78,7 +80,7 @@ def _numbers(place: str, row: list[str], *columns: int) -> list[float]:
 
 def _odometry(path: Path, rows: list[Fields]) -> list[Odometry]:
     """Wheel speeds hold for the interval that ends at their time; the first interval is as long as the second."""
-    times = [exact_ns(row[1]) for _, row in rows]
+    times = [exact_ns(row[1] if len(row) > 1 else "", place) for place, row in rows]
     if len(times) < 2:
         raise RecordingError(f"{path}: fewer than two odom2diff rows; give a recording with odometry")
     found = []
@@ -95,4 +97,4 @@ def _truths(path: Path) -> list[Truth]:
     if not path.is_file():
         return []
     rows = [(place, row) for place, row in _rows(path) if row[0] == "point2"]
-    return [Truth(exact_ns(row[1]), *_numbers(place, row, 2, 3)) for place, row in rows]
+    return [Truth(exact_ns(row[1] if len(row) > 1 else "", place), *_numbers(place, row, 2, 3)) for place, row in rows]

@@ -1,0 +1,155 @@
+"""The weighted average of Moro & Mehrpouyan 2019 (Algorithm 1) with weights by Bayes' rule: the paper's future work.
+
+Each radio fix is either good, with the covariance of its trilateration, or an outlier anywhere on the floor. The
+weight of the fix is the Kalman gain of a good one times the posterior probability that it is good: the probabilistic
+data association filter with one measurement (Bar-Shalom, Li & Kirubarajan 2001, section 6.4; Bar-Shalom & Tse 1975).
+The posterior of the two cases is moment-matched, so the covariance grows when they disagree.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fusion import (
+    Covariance,
+    Decision,
+    Estimate,
+    Fate,
+    Increment,
+    Measurement,
+    Odometry,
+    ParameterError,
+    Pose,
+    Prior,
+    Ranges,
+    Reason,
+    Sighting,
+    Tag,
+    WifiScan,
+    World,
+    compose,
+    sightings,
+    wrap_angle,
+)
+from fusion.belief import HEADING_KNOWN_STD, starting_belief
+from fusion.fix import Recent, fix_from, remember
+from fusion.screen import unusable
+from fusion.trilateration import Fix
+from fusion.values import nanoseconds
+
+Array = NDArray[np.float64]
+USED_FROM = 0.5
+"""A fix more likely good than not counts as used."""
+
+
+class State(NamedTuple):
+    """Pose and covariance at the last fix, the motion since, and readings waiting for a fix."""
+
+    pose: Pose
+    covariance: Covariance
+    motion: Increment
+    recent: Recent
+
+
+class BayesWeight:
+    """Weighted average with Bayesian weights.
+
+    Parameters
+    ----------
+    outlier_probability
+        Prior probability that a fix is an outlier; 0 makes this a Kalman filter on fixes.
+    window_s
+        How long readings wait for those of other anchors to make a fix [s]; each reading is used once.
+    """
+
+    summary: ClassVar[str] = "weighted average of odometry and fix, weights by Bayes' rule"
+    tags: ClassVar[frozenset[Tag]] = frozenset({Tag.GLOBAL_START})
+
+    def __init__(self, world: World, *, outlier_probability: float = 0.2, window_s: float = 2.5) -> None:
+        if not 0.0 <= outlier_probability < 1.0 or window_s < 0.0:
+            raise ParameterError(
+                "bayes_weight: outlier_probability must be in [0, 1) and window_s not negative; "
+                f"got {outlier_probability}, {window_s}"
+            )
+        self._world = world
+        self._outlier_probability = outlier_probability
+        self._window_ns = nanoseconds(window_s)
+        bounds = world.bounds
+        self._outlier_density = 1.0 / ((bounds.x_max - bounds.x_min) * (bounds.y_max - bounds.y_min))
+
+    def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
+        """The prior, no motion yet."""
+        return State(*starting_belief(self._world, prior), Increment(), ())
+
+    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
+        """Gather motion; weigh a fix in when there is one."""
+        if isinstance(measurement, Odometry):
+            return state._replace(motion=state.motion.extend(measurement, self._world.robot.noise)), ()
+        if not isinstance(measurement, WifiScan | Ranges):
+            return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+        seen = tuple(s._replace(variance=s.variance + s.model.bias_std**2) for s in sightings(self._world, measurement))
+        recent = remember(state.recent, measurement.time_ns, seen, self._window_ns)
+        fix = fix_from(recent, self._world.robot)
+        if isinstance(fix, Reason):
+            return state._replace(recent=recent), unusable(measurement, fix)
+        pose, covariance = compose(state.pose, state.covariance, state.motion)
+        moved, moved_covariance, good = self.weigh(pose, covariance, fix)
+        fates = self._fates(measurement, seen, pose, covariance, good)
+        return State(moved, moved_covariance, Increment(), ()), fates
+
+    def estimate(self, state: State, time_ns: int) -> Estimate:
+        """The pose after the motion since the last fix."""
+        pose, covariance = compose(state.pose, state.covariance, state.motion)
+        return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
+
+    def weigh(self, pose: Pose, covariance: Covariance, fix: Fix) -> tuple[Pose, Covariance, float]:
+        """Pose, covariance, and the posterior probability that ``fix`` is good."""
+        p, r = np.array(covariance.matrix), np.array([[fix.xx, fix.xy], [fix.xy, fix.yy]])
+        innovation, h = self._innovation(pose, fix)
+        s = h @ p @ h.T + r
+        inverse = np.linalg.inv(s)
+        likelihood = math.exp(-0.5 * float(innovation @ inverse @ innovation)) / math.sqrt(
+            math.tau**2 * float(np.linalg.det(s))
+        )
+        good_share = (1.0 - self._outlier_probability) * likelihood
+        total = good_share + self._outlier_probability * self._outlier_density
+        good = good_share / total if total > 0.0 else 0.0
+        gain = p @ h.T @ inverse
+        # Moment matching: P - beta K S Kᵀ + beta (1 - beta) (K nu)(K nu)ᵀ, and the mean moves by beta K nu.
+        jump = gain @ innovation
+        p = p - good * gain @ s @ gain.T + good * (1.0 - good) * np.outer(jump, jump)
+        x, y, heading = (np.array(pose) + good * jump).tolist()
+        cells = (0.5 * (p + p.T)).tolist()
+        spread = Covariance(cells[0][0], cells[0][1], cells[0][2], cells[1][1], cells[1][2], cells[2][2])
+        return Pose(x, y, wrap_angle(heading)), spread, good
+
+    def _innovation(self, pose: Pose, fix: Fix) -> tuple[Array, Array]:
+        """Fix minus predicted antenna position [m], and its Jacobian by the pose, (2, 3)."""
+        forward, left, _ = self._world.robot.antenna_m
+        x, y = pose.transform(forward, left)
+        jacobian = np.array([[1.0, 0.0, -(y - pose.y)], [0.0, 1.0, x - pose.x]])
+        return np.array([fix.x - x, fix.y - y]), jacobian
+
+    def _fates(
+        self,
+        scan: WifiScan | Ranges,
+        seen: tuple[Sighting, ...],
+        pose: Pose,
+        covariance: Covariance,
+        good: float,
+    ) -> tuple[Fate, ...]:
+        """One per anchor, with the fix's probability as weight and the reading's own innovation."""
+        p, antenna = np.array(covariance.matrix), self._world.robot.antenna_m
+        verdict = (Decision.USED, Reason.OK) if good >= USED_FROM else (Decision.DOWNWEIGHTED, Reason.OUTLIER)
+        fates = []
+        for item in seen:
+            expected = item.expect(*pose, antenna)
+            row = np.array([expected.by_x, expected.by_y, expected.by_heading])
+            innovation, variance = item.value - expected.value, float(row @ p @ row) + item.variance
+            who = (scan.time_ns, scan.sensor, scan.seq, item.anchor.id)
+            fates.append(Fate(*who, *verdict, good, innovation, variance, innovation**2 / variance))
+        return tuple(fates)

@@ -1,0 +1,78 @@
+"""Odometry alone: the floor that every other estimator must beat.
+
+Its covariance holds the white noise of the increments and the calibration errors that stay the same for the whole
+run, by their first-order effect on the path so far (Borenstein & Feng 1996: systematic errors dominate indoors).
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple
+
+from fusion import (
+    Covariance,
+    Estimate,
+    Fate,
+    Increment,
+    Measurement,
+    Odometry,
+    OdometryNoise,
+    Pose,
+    Prior,
+    Reason,
+    Tag,
+    World,
+    compose,
+)
+from fusion.belief import HEADING_KNOWN_STD, starting_belief
+from fusion.screen import unusable
+
+
+class State(NamedTuple):
+    """Where the run started, and all motion since."""
+
+    pose: Pose
+    covariance: Covariance
+    motion: Increment
+    position_known: bool
+
+
+class DeadReckoning:
+    """Dead reckoning from the prior pose. Radio readings are unusable to it."""
+
+    summary: ClassVar[str] = "odometry alone"
+    tags: ClassVar[frozenset[Tag]] = frozenset({Tag.NO_RADIO})
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._noise = world.robot.noise
+
+    def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
+        """The prior, no motion yet."""
+        return State(*starting_belief(self._world, prior), Increment(), prior.position_known)
+
+    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
+        """Add odometry."""
+        if isinstance(measurement, Odometry):
+            return state._replace(motion=state.motion.extend(measurement, self._noise)), ()
+        return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+
+    def estimate(self, state: State, time_ns: int) -> Estimate:
+        """The start pose composed with all motion; not valid when the start position is unknown."""
+        pose, covariance = compose(state.pose, state.covariance, _with_calibration(state.motion, self._noise))
+        known = covariance.hh < HEADING_KNOWN_STD**2
+        return Estimate(time_ns, pose, covariance, valid=state.position_known, heading_known=known)
+
+
+def _with_calibration(motion: Increment, noise: OdometryNoise) -> Increment:
+    """The motion with its calibration errors as further covariance: sum of sigma^2 J Jᵀ over the three of them."""
+    columns = (
+        (noise.distance_scale_std, (motion.x, motion.y, 0.0)),
+        (noise.turn_scale_std, (motion.x_by_scale, motion.y_by_scale, motion.heading)),
+        (noise.turn_bias_std_rad_s, (motion.x_by_bias, motion.y_by_bias, motion.duration_s)),
+    )
+    xx, xy, xh, yy, yh, hh = motion.xx, motion.xy, motion.xh, motion.yy, motion.yh, motion.hh
+    for std, (x, y, h) in columns:
+        v = std * std
+        xx, xy, xh = xx + v * x * x, xy + v * x * y, xh + v * x * h
+        yy, yh, hh = yy + v * y * y, yh + v * y * h, hh + v * h * h
+    return motion._replace(xx=xx, xy=xy, xh=xh, yy=yy, yh=yh, hh=hh)

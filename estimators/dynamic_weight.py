@@ -1,0 +1,204 @@
+"""The dynamic weight-allocation algorithm, as published (Moro & Mehrpouyan 2019, Algorithms 1 and 2, eq. 5).
+
+The paper leaves some things open. Each is a named parameter whose default is the most literal reading; nothing else is
+added. The method claims no covariance, so its estimates carry none.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, NamedTuple
+
+from fusion import (
+    Decision,
+    Estimate,
+    Fate,
+    Measurement,
+    Odometry,
+    ParameterError,
+    Pose,
+    Prior,
+    Ranges,
+    Reason,
+    Sighting,
+    Tag,
+    WifiScan,
+    World,
+    sightings,
+    wrap_angle,
+)
+from fusion.errors import did_you_mean
+from fusion.fix import Recent, fix_from, remember
+from fusion.screen import unusable
+from fusion.trilateration import Fix
+from fusion.values import nanoseconds
+
+OUTLIER_SCALES = ("coordinate", "position", "travelled", "floor")
+MISSING = ("ignore", "count")
+
+
+class State(NamedTuple):
+    """Fused position, odometry position and heading, both weights, the counter, and readings waiting for a fix."""
+
+    fused: Pose
+    odometry: Pose
+    wifi_weight: float
+    odo_counter: int
+    travelled_m: float
+    recent: Recent
+    position_known: bool
+    heading_known: bool
+
+
+class DynamicWeight:
+    """The paper's weighted average of odometry and Wi-Fi fix.
+
+    Parameters
+    ----------
+    outlier_percent
+        xi: a fix that differs from the odometry position by more is an outlier [%].
+    outlier_relative_to
+        Percent of what: each ``coordinate`` of the odometry position (the literal reading), the norm of the
+        ``position``, the distance ``travelled``, or the diagonal of the ``floor``.
+    epsilon
+        odoCounter from which odometry counts as not credible.
+    raised_weight
+        w_Wi-Fi after "increase w_Wi-Fi and reduce w_odo".
+    feedback
+        Whether each odometry step starts from the fused location ("using the previous location of the robot").
+    missing_wifi
+        Whether a scan without a fix leaves the counter alone (``ignore``) or raises it (``count``).
+    window_s
+        How long readings wait for those of other anchors to make a fix [s]; each reading is used once.
+    """
+
+    summary: ClassVar[str] = "dynamic weight allocation of Moro & Mehrpouyan (2019)"
+    tags: ClassVar[frozenset[Tag]] = frozenset({Tag.NO_COVARIANCE})
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        outlier_percent: float = 10.0,
+        outlier_relative_to: str = "coordinate",
+        epsilon: int = 3,
+        raised_weight: float = 0.75,
+        feedback: bool = True,
+        missing_wifi: str = "ignore",
+        window_s: float = 2.5,
+    ) -> None:
+        for name, value, known in (
+            ("outlier_relative_to", outlier_relative_to, OUTLIER_SCALES),
+            ("missing_wifi", missing_wifi, MISSING),
+        ):
+            if value not in known:
+                raise ParameterError(f"dynamic_weight: {name} is {value!r}; {did_you_mean(value, known)}")
+        if outlier_percent <= 0.0 or not 0.5 <= raised_weight <= 1.0 or epsilon < 0 or window_s < 0.0:
+            raise ParameterError(
+                "dynamic_weight: outlier_percent must be positive, raised_weight in [0.5, 1], epsilon and window_s not "
+                f"negative; got {outlier_percent}, {raised_weight}, {epsilon}, {window_s}"
+            )
+        self._world = world
+        self._share = outlier_percent / 100.0
+        self._relative_to = outlier_relative_to
+        self._epsilon = epsilon
+        self._raised_weight = raised_weight
+        self._feedback = feedback
+        self._count_missing = missing_wifi == "count"
+        self._window_ns = nanoseconds(window_s)
+
+    def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
+        """Algorithm 1, line 1: both weights 0.5, the counter 0, odometry at the start."""
+        return State(prior.pose, prior.pose, 0.5, 0, 0.0, (), prior.position_known, prior.heading_known)
+
+    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
+        """Odometry moves both positions; a fix is weighed in."""
+        if isinstance(measurement, Odometry):
+            return self._move(state, measurement), ()
+        if not isinstance(measurement, WifiScan | Ranges):
+            return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+        seen = sightings(self._world, measurement)
+        recent = remember(state.recent, measurement.time_ns, seen, self._window_ns)
+        fix = fix_from(recent, self._world.robot)
+        if isinstance(fix, Reason):
+            counter = state.odo_counter + int(self._count_missing)
+            return state._replace(recent=recent, odo_counter=counter), unusable(measurement, fix)
+        return self._fuse(state, self._base(fix, state), measurement, seen)
+
+    def estimate(self, state: State, time_ns: int) -> Estimate:
+        """The fused position with odometry's heading; no covariance is claimed."""
+        return Estimate(time_ns, state.fused, None, valid=state.position_known, heading_known=state.heading_known)
+
+    def _move(self, state: State, odometry: Odometry) -> State:
+        """Algorithm 1, line 3: (x_odo, y_odo) from the wheels and the previous location."""
+        half = 0.5 * odometry.turn_rad
+        step = Pose(odometry.distance_m * math.cos(half), odometry.distance_m * math.sin(half), odometry.turn_rad)
+        travelled = state.travelled_m + abs(odometry.distance_m)
+        moved = state._replace(fused=state.fused.compose(step), travelled_m=travelled)
+        return moved._replace(odometry=moved.fused if self._feedback else state.odometry.compose(step))
+
+    def _base(self, fix: Fix, state: State) -> tuple[float, float]:
+        """The robot's base for a fix of its antenna, with odometry's heading."""
+        forward, left, _ = self._world.robot.antenna_m
+        arm_x, arm_y = Pose(0.0, 0.0, state.odometry.heading).transform(forward, left)
+        return fix.x - arm_x, fix.y - arm_y
+
+    def _fuse(
+        self, state: State, fix: tuple[float, float], scan: WifiScan | Ranges, seen: tuple[Sighting, ...]
+    ) -> tuple[State, tuple[Fate, ...]]:
+        """Algorithm 1, lines 4 to 6."""
+        x, y, heading = state.odometry
+        if not state.position_known:
+            x, y = fix
+        outlier = self._is_outlier(fix, (x, y), state.travelled_m)
+        wifi_weight, counter = self.allocate(outlier=outlier, odo_counter=state.odo_counter)
+        odo_weight = 1.0 - wifi_weight
+        # Eq. 5: x = x_odo w_odo + x_Wi-Fi w_Wi-Fi, and the same for y.
+        fused = Pose(x * odo_weight + fix[0] * wifi_weight, y * odo_weight + fix[1] * wifi_weight, wrap_angle(heading))
+        after = state._replace(
+            fused=fused,
+            odometry=fused if self._feedback else state.odometry,
+            wifi_weight=wifi_weight,
+            odo_counter=counter,
+            recent=(),
+            position_known=True,
+        )
+        return after, self._fates(scan, seen, Pose(x, y, heading), wifi_weight, outlier=outlier)
+
+    def allocate(self, *, outlier: bool, odo_counter: int) -> tuple[float, int]:
+        """Algorithm 2: the weight of the Wi-Fi fix and the new odoCounter; w_odo = 1 - w_Wi-Fi."""
+        if odo_counter >= self._epsilon and not outlier:
+            return self._raised_weight, 0
+        if not outlier:
+            return 0.5, 0
+        return 0.0, odo_counter + 1
+
+    def _is_outlier(self, fix: tuple[float, float], odometry: tuple[float, float], travelled_m: float) -> bool:
+        """Section III-B: differs from (x_odo, y_odo) by more than xi percent."""
+        away = math.dist(fix, odometry)
+        if self._relative_to == "coordinate":
+            return any(abs(f - o) > self._share * abs(o) for f, o in zip(fix, odometry, strict=True))
+        if self._relative_to == "position":
+            return away > self._share * math.hypot(*odometry)
+        if self._relative_to == "travelled":
+            return away > self._share * travelled_m
+        bounds = self._world.bounds
+        return away > self._share * math.hypot(bounds.x_max - bounds.x_min, bounds.y_max - bounds.y_min)
+
+    def _fates(
+        self, scan: WifiScan | Ranges, seen: tuple[Sighting, ...], odometry: Pose, weight: float, *, outlier: bool
+    ) -> tuple[Fate, ...]:
+        verdict = (Decision.REJECTED, Reason.OUTLIER) if outlier else (Decision.USED, Reason.OK)
+        antenna = self._world.robot.antenna_m
+        return tuple(
+            Fate(
+                scan.time_ns,
+                scan.sensor,
+                scan.seq,
+                item.anchor.id,
+                *verdict,
+                weight,
+                item.value - item.expect(odometry.x, odometry.y, odometry.heading, antenna).value,
+            )
+            for item in seen
+        )

@@ -1,0 +1,56 @@
+"""filterpy's unscented Kalman filter behind our contract: the same as its extended one, without any derivative.
+
+Sigma points are Julier's with kappa = 3 - n = 0 (Julier & Uhlmann 1997): all weights stay at or above zero, where a
+small spread gives a large negative centre weight and covariances that are none. Headings stay unwrapped among the
+sigma points, so plain means and differences are right.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimators.filterpy_ekf import FilterpyFilter, Readings, State, away, filterpy_kalman, motion_noise
+from estimators.sampling import Array, square_root, total_variance
+
+
+class FilterpyUkf(FilterpyFilter):
+    """The ``UnscentedKalmanFilter`` of filterpy.
+
+    Parameters
+    ----------
+    gate_probability
+        A reading is refused when its normalised innovation squared is beyond this quantile of chi-square with one
+        degree of freedom. 1.0 takes every reading.
+    """
+
+    summary: ClassVar[str] = "unscented Kalman filter of filterpy"
+
+    def _predicted(self, state: State) -> Any:  # noqa: ANN401 - filterpy is not typed
+        kalman = filterpy_kalman()
+        points = kalman.JulierSigmaPoints(3, kappa=0.0, sqrt_method=square_root)
+        belief = kalman.UnscentedKalmanFilter(
+            dim_x=3, dim_z=1, dt=0.0, hx=None, fx=lambda x, _: away(x, state.motion), points=points
+        )
+        belief.x, belief.P = np.array(state.pose), np.array(state.covariance.matrix)
+        belief.Q = motion_noise(state)
+        belief.predict()
+        return belief
+
+    def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
+        expected = self._expected_at(belief.sigmas_f, readings)
+        values = belief.Wm @ expected
+        return values, belief.Wc @ np.square(expected - values)
+
+    def _correct(self, belief: Any, readings: Readings) -> None:  # noqa: ANN401
+        variances = np.diag([total_variance(sighting) for sighting in readings])
+        seen = np.array([sighting.value for sighting in readings])
+        belief.update(seen, R=variances, hx=lambda x: self._expected_at(x[None, :], readings)[0])
+
+    def _expected_at(self, poses: Array, readings: Readings) -> Array:
+        """Expected readings (n, m) at ``poses`` (n, 3)."""
+        antenna_m = self._world.robot.antenna_m
+        x, y, heading = poses.T
+        columns = [sighting.expected_values(x, y, heading, antenna_m) for sighting in readings]
+        return np.array(columns).reshape(-1, len(poses)).T

@@ -1,0 +1,103 @@
+"""What a simulated run is made of: a TOML file with three parts that are kept strictly apart.
+
+``[world]`` is what estimators are told (a world file, `docs/world.md`), ``[route]`` is where the robot is driven, and
+``[reality]`` is what is really so and nobody is told: shadowing, walls that swallow signal, slipping wheels, a gyro
+bias. The built-in scenarios carry the paper's path-loss exponents; their floor plans and anchor places are our own,
+since the paper's drawings are not published as data.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from fusion import World, WorldError
+from fusion.errors import did_you_mean
+from fusion.schema import check_keys, read_record
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """Way-points [m], driven one after another; the robot turns on the spot and pauses at each."""
+
+    waypoints_m: tuple[tuple[float, float], ...]
+    speed_m_s: float = 0.4
+    turn_rate_rad_s: float = 0.9
+    pause_s: float = 1.0
+    laps: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Reality:
+    """What the estimators are not told. Deviations are drawn once a run from the standard deviations given."""
+
+    anchor_offset_std_db: float = 2.0
+    shadowing_std_db: float = 3.0
+    """Shadowing that belongs to the place [dB], alike over ``shadowing_length_m``."""
+    shadowing_length_m: float = 2.0
+    fading_std_db: float = 2.0
+    """Scan to scan [dB]."""
+    wall_loss_db: float = 4.0
+    deaf_below_dbm: float = -92.0
+    range_std_m: float = 0.1
+    wall_excess_m: float = 0.3
+    """Mean excess of a range through walls [m]."""
+    distance_scale_std: float = 0.02
+    track_scale_std: float = 0.05
+    slip_std: float = 0.03
+    """Wheel roll that does not become motion, as a share, drawn anew each half second."""
+    gyro_bias_std_rad_s: float = 0.002
+    gyro_noise_std_rad_s: float = 0.01
+    start_std_m: float = 0.05
+    start_heading_std_rad: float = 0.03
+    ticks_hz: float = 20.0
+    gyro_hz: float = 50.0
+    wifi_hz: float = 2.0
+    range_hz: float = 0.0
+    truth_hz: float = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """One simulated experiment."""
+
+    name: str
+    world: World
+    route: Route
+    reality: Reality
+
+
+def builtin_names() -> tuple[str, ...]:
+    """Scenarios that come with the package."""
+    files = (entry.name for entry in resources.files("sensors").joinpath("scenarios").iterdir())
+    return tuple(sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml")))
+
+
+def load_scenario(scenario: str | Path) -> Scenario:
+    """A built-in scenario by name, or one from a file; raises `WorldError`."""
+    path = Path(scenario)
+    if path.suffix == ".toml":
+        try:
+            return _parse(path.stem, path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            raise WorldError(f"{path}: cannot be read ({error}); give a scenario file") from error
+    if str(scenario) not in builtin_names():
+        raise WorldError(f"no scenario {str(scenario)!r}; {did_you_mean(str(scenario), builtin_names())}")
+    return _parse(
+        str(scenario), resources.files("sensors").joinpath("scenarios", f"{scenario}.toml").read_text("utf-8")
+    )
+
+
+def _parse(name: str, text: str) -> Scenario:
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise WorldError(f"scenario {name}: not TOML: {error}; correct that line") from error
+    check_keys(table, dict.fromkeys(("world", "route", "reality")), f"scenario {name}")
+    route = read_record(Route, table.get("route", {}), f"scenario {name}: route")
+    if len(route.waypoints_m) < 2:
+        raise WorldError(f"scenario {name}: route.waypoints_m needs at least two places to drive between")
+    world = World.from_table({"name": name, **table.get("world", {})})
+    return Scenario(name, world, route, read_record(Reality, table.get("reality", {}), f"scenario {name}: reality"))

@@ -1,0 +1,160 @@
+"""filterpy's filters behind our contract, against our own filter, the exact Kalman filter, and each other."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from estimators.ekf import Ekf
+from fusion import (
+    Covariance,
+    Decision,
+    Odometry,
+    ParameterError,
+    PluginError,
+    Pose,
+    Prior,
+    RangeReading,
+    Ranges,
+    World,
+    build,
+    digest,
+    track,
+)
+from fusion.values import NANOSECONDS as SECOND
+
+pytest.importorskip("filterpy.kalman")
+BOTH = pytest.mark.parametrize("name", ["filterpy_ekf", "filterpy_ukf"])
+PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0), "d": (9.0, 7.0)}
+PLAIN_NOISE = {"distance_scale_std": 0.0, "turn_scale_std": 0.0, "turn_bias_std_rad_s": 0.0}
+START = Pose(4.0, 1.0, 0.2)
+
+
+def world(noise=PLAIN_NOISE, places=PLACES, antenna_m=(0.1, 0.05, 0.0)):
+    anchors = [{"id": name, "position_m": list(place)} for name, place in places.items()]
+    robot = {"noise": noise, "antenna_m": list(antenna_m)}
+    return World.from_table({"anchors": anchors, "robot": robot, "ranging": {"std_m": 0.2, "bias_std_m": 0.1}})
+
+
+def drive(seconds=20, std=0.2, outlier_at=None, map_from_room=Pose(0.0, 0.0, 0.0)):
+    """A circle: odometry at 10 Hz, all four ranges to the antenna at 2 Hz."""
+    random, pose, measurements, truth = np.random.default_rng(3), START, [], []
+    for k in range(1, seconds * 10 + 1):
+        t = k * SECOND // 10
+        middle = pose.heading + 0.0075
+        pose = Pose(pose.x + 0.05 * math.cos(middle), pose.y + 0.05 * math.sin(middle), pose.heading + 0.015)
+        measurements.append(Odometry(t, "w", k, t - SECOND // 10, 0.05, 0.015))
+        if k % 5 == 0:
+            at = pose.transform(0.1, 0.05)
+            far = {n: math.dist(at, place) + random.normal(0, std) for n, place in PLACES.items()}
+            far["a"] += 30.0 if k == outlier_at else 0.0
+            measurements.append(Ranges(t, "uwb", k, tuple(RangeReading(n, z) for n, z in far.items())))
+            truth.append(map_from_room.compose(pose))
+    return measurements, truth
+
+
+def prior(pose=START, **known):
+    return Prior(0, pose, Covariance.from_std(0.3, 0.3, 0.2), **known)
+
+
+def radio_updates(estimator, place, measurements, start):
+    return [u for u in track(estimator, place, measurements, start) if u.fates]
+
+
+def test_extended_filter_equals_ours_to_1e_9():
+    place, (measurements, _) = world(), drive(outlier_at=100)
+    ours = track(Ekf(place, estimate_anchor_bias=False), place, measurements, prior())
+    theirs = track(build("filterpy_ekf", place), place, measurements, prior())
+    for own, other in zip(ours, theirs, strict=True):
+        assert np.allclose(own.estimate.pose, other.estimate.pose, rtol=0, atol=1e-9)
+        assert np.allclose(own.estimate.covariance, other.estimate.covariance, rtol=0, atol=1e-9)
+        for fate, other_fate in zip(own.fates, other.fates, strict=True):
+            assert fate[:7] == other_fate[:7]
+            assert np.allclose(fate[7:], other_fate[7:], rtol=1e-6, atol=1e-9)
+
+
+@BOTH
+def test_filter_on_a_linear_problem_is_the_kalman_filter(name):
+    """Driving straight at an anchor on the x axis, the range is linear in x: compare with the scalar Kalman filter."""
+    places = {"a": (1000.0, 0.0), "b": (0.0, 900.0), "c": (-500.0, -500.0)}
+    still = {"turn_std_per_sqrt_m": 0.0, "turn_std_per_sqrt_s": 0.0, "side_std_per_sqrt_m": 0.0}
+    place = world({**PLAIN_NOISE, **still}, places, (0.0, 0.0, 0.0))
+    start = Prior(0, Pose(0.0, 0.0, 0.0), Covariance(0.5, 0.0, 0.0, 0.0, 0.0, 0.0))
+    mean, variance, measurements, expected = 0.0, 0.5, [], []
+    for k in range(1, 40):
+        t, reading = k * SECOND, 1000.0 - 0.1 * k + 0.3 * math.sin(k)
+        measurements += [Odometry(t, "w", k, t - SECOND, 0.1, 0.0), Ranges(t, "r", k, (RangeReading("a", reading),))]
+        mean, variance = mean + 0.1, variance + 0.02**2 * 0.1 + 0.002**2
+        gain = variance / (variance + 0.2**2 + 0.1**2)
+        mean, variance = mean + gain * (1000.0 - reading - mean), (1.0 - gain) * variance
+        expected.append((mean, variance))
+    updates = radio_updates(build(name, place, {"gate_probability": 1.0}), place, measurements, start)
+    got = [(u.estimate.pose.x, u.estimate.covariance.xx) for u in updates]
+    assert np.allclose(got, expected, rtol=0, atol=1e-9)
+
+
+@BOTH
+def test_noiseless_data_lead_to_the_truth(name):
+    measurements, truth = drive(std=0.0)
+    last = radio_updates(build(name, world()), world(), measurements, prior())[-1].estimate
+    assert math.dist(last.pose[:2], truth[-1][:2]) < 0.01
+
+
+def test_unscented_and_extended_filter_are_close_once_settled():
+    measurements, _ = drive()
+    runs = (radio_updates(build(n, world()), world(), measurements, prior()) for n in ("filterpy_ekf", "filterpy_ukf"))
+    for one, other in list(zip(*runs, strict=True))[10:]:
+        assert math.dist(one.estimate.pose[:2], other.estimate.pose[:2]) < 0.02
+
+
+@BOTH
+def test_turning_and_shifting_the_world_turns_and_shifts_the_answer(name):
+    turned = Pose(-3.0, 5.0, 2.2)
+    place = world(places={anchor: turned.transform(*at) for anchor, at in PLACES.items()})
+    measurements, _ = drive()
+    plain = radio_updates(build(name, world()), world(), measurements, prior())
+    moved = radio_updates(build(name, place), place, measurements, prior(turned.compose(START)))
+    for before, after in zip(plain, moved, strict=True):
+        assert np.allclose(turned.compose(before.estimate.pose), after.estimate.pose, rtol=0, atol=1e-9)
+
+
+@BOTH
+def test_reading_beyond_the_gate_is_refused_and_open_gate_takes_it(name):
+    measurements, _ = drive(outlier_at=150)
+    gated, open_gate = (
+        radio_updates(build(name, world(), {"gate_probability": gate}), world(), measurements, prior())[29]
+        for gate in (0.999, 1.0)
+    )
+    assert gated.fates[0].decision is Decision.REJECTED
+    assert gated.fates[0].innovation == pytest.approx(30.0, abs=1.0)
+    assert open_gate.fates[0].decision is Decision.USED
+
+
+@BOTH
+def test_unknown_heading_is_found_by_driving(name):
+    measurements, truth = drive(seconds=60)
+    updates = radio_updates(build(name, world()), world(), measurements, prior(heading_known=False))
+    assert not updates[0].estimate.heading_known
+    assert updates[-1].estimate.heading_known
+    assert math.dist(updates[-1].estimate.pose[:2], truth[-1][:2]) < 0.3
+
+
+@BOTH
+def test_same_input_gives_the_same_bytes(name):
+    measurements, _ = drive(seconds=5)
+    one, two = (digest(radio_updates(build(name, world()), world(), measurements, prior())) for _ in range(2))
+    assert one == two
+
+
+@BOTH
+def test_missing_filterpy_is_told_with_the_remedy(name, monkeypatch):
+    monkeypatch.setitem(sys.modules, "filterpy.kalman", None)
+    with pytest.raises(PluginError, match=r"pip install fusion-localization\[filterpy\]"):
+        build(name, world())
+
+
+@BOTH
+def test_impossible_gate_is_refused(name):
+    with pytest.raises(ParameterError, match="gate_probability"):
+        build(name, world(), {"gate_probability": 0.0})
