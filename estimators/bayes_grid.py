@@ -78,14 +78,14 @@ class BayesGrid:
         y = bounds.y_min + self._cell_m * (np.arange(max(2, math.ceil(depth / self._cell_m))) + 0.5)
         # The middle of the bins is heading zero's own, so a robot aligned with the map sits in one bin.
         heading = self._bin_rad * np.arange(headings)
-        self._heading, self._x, self._y = np.meshgrid(heading, x, y, indexing="ij")
+        self._heading, self._x, self._y = np.meshgrid(heading, x, y, indexing="ij", sparse=True)
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
         """The prior's density in the middle of every cell, smoothed by half a cell; uniform where it is unknown."""
         known = [prior.position_known, prior.position_known, prior.heading_known]
         x, y, heading = prior.pose
         turn = wrapped(self._heading - heading)
-        away = np.stack([self._x - x, self._y - y, turn], axis=-1)[..., known]
+        away = np.stack(np.broadcast_arrays(self._x - x, self._y - y, turn), axis=-1)[..., known]
         smoothing = np.diag([self._cell_m, self._cell_m, self._bin_rad]) / 2.0
         spread = (np.array(prior.covariance.matrix) + smoothing @ smoothing)[np.ix_(known, known)]
         exponent = np.einsum("...i,ij,...j->...", away, np.linalg.inv(spread), away)
@@ -135,7 +135,8 @@ class BayesGrid:
         c, s = np.cos(self._heading), np.sin(self._heading)
         x, y = self._x + c * motion.x - s * motion.y, self._y + s * motion.x + c * motion.y
         expected = sighting.expected_values(x, y, self._heading + motion.heading, self._world.robot.antenna_m)
-        by_x, by_y = np.gradient(expected, axis=(1, 2))
+        # One heading's floor shows the spread within a cell well enough for all.
+        by_x, by_y = np.gradient(expected[0])
         variance = total_variance(sighting) + (by_x * by_x + by_y * by_y) / 12.0
         return mixture(sighting.value - expected, variance, self._outlier_share)
 

@@ -43,6 +43,8 @@ from fusion.screen import unusable
 Array = NDArray[np.float64]
 POSE = slice(0, 3)
 HEADING = 2
+MOST_ALIKE = 3.0
+"""How many neighbouring readings at most are taken to share one error."""
 
 
 class State(NamedTuple):
@@ -84,7 +86,7 @@ class Ekf:
         estimate_odometry: bool = True,
         estimate_range_bias: bool = True,
         estimate_rssi_bias: bool = False,
-        rssi_bias_length_m: float = 5.0,
+        rssi_bias_length_m: float = 2.0,
         range_bias_length_m: float = 100.0,
     ) -> None:
         if not 0.0 < gate_probability <= 1.0:
@@ -106,14 +108,14 @@ class Ekf:
                 stds.append(model.gain_std)
         self._first_bias = 3 + len(stds)
         self._bias_index: dict[tuple[str, type], int] = {}
-        lengths_m = {PathLoss: rssi_bias_length_m, Ranging: range_bias_length_m}
+        self._lengths_m = {PathLoss: rssi_bias_length_m, Ranging: range_bias_length_m}
         kept_m = []
         wanted = {PathLoss: estimate_rssi_bias, Ranging: estimate_range_bias}
         for anchor_id, model in models:
             if wanted[type(model)] and model.bias_std > 0.0:
                 self._bias_index[anchor_id, type(model)] = 3 + len(stds)
                 stds.append(model.bias_std)
-                kept_m.append(lengths_m[type(model)])
+                kept_m.append(self._lengths_m[type(model)])
         self._extra_variance = np.square(np.array(stds))
         self._bias_length_m = np.array(kept_m)
 
@@ -195,7 +197,7 @@ class Ekf:
         mean, covariance = prior_mean.copy(), prior_covariance
         fates = []
         for sighting in sightings(self._world, scan):
-            innovation, row, variance = self._linearise(sighting, prior_mean)
+            innovation, row, variance = self._linearise(sighting, prior_mean, state.motion.path_m)
             spread = float(row @ prior_covariance @ row) + variance
             nis = innovation * innovation / spread
             used = nis <= self._gate
@@ -211,8 +213,8 @@ class Ekf:
         mean[HEADING] = wrap_angle(float(mean[HEADING]))
         return State(scan.time_ns, mean, 0.5 * (covariance + covariance.T), Increment()), tuple(fates)
 
-    def _linearise(self, sighting: Sighting, mean: Array) -> tuple[float, Array, float]:
-        """Innovation, Jacobian row and variance of one reading at the belief ``mean``."""
+    def _linearise(self, sighting: Sighting, mean: Array, path_m: float) -> tuple[float, Array, float]:
+        """Innovation, Jacobian row and variance of one reading at the belief ``mean``, ``path_m`` after the last."""
         x, y, heading = mean[POSE].tolist()
         expected = sighting.expect(x, y, heading, self._world.robot.antenna_m)
         row = np.zeros(len(mean))
@@ -222,7 +224,8 @@ class Ekf:
             row[gain] = expected.by_gain
             innovation -= expected.by_gain * float(mean[gain])
         if (bias := self._bias_index.get((sighting.anchor.id, kind))) is None:
-            return innovation, row, variance + sighting.model.bias_std**2
+            alike = min(max(self._lengths_m[kind] / max(path_m, 1e-9), 1.0), MOST_ALIKE)
+            return innovation, row, variance + alike * sighting.model.bias_std**2
         row[bias] = 1.0
         return innovation - float(mean[bias]), row, variance
 

@@ -1,8 +1,9 @@
 """filterpy's unscented Kalman filter behind our contract: the same as its extended one, without any derivative.
 
-Sigma points are Julier's with kappa = 3 - n = 0 (Julier & Uhlmann 1997): all weights stay at or above zero, where a
-small spread gives a large negative centre weight and covariances that are none. Headings stay unwrapped among the
-sigma points, so plain means and differences are right.
+Sigma points are the scaled ones of van der Merwe (2004). A spread of 1/2 puts them sqrt(3)/2 standard deviations out:
+those of an unknown heading then look 90 degrees to either side, where the usual sqrt(3) would make both look backwards,
+and no reading could tell them apart. With n = 3 the second parameter 9/4 makes the centre's covariance weight zero, so
+no covariance can turn negative. Headings stay unwrapped among the points, so plain means and differences are right.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class FilterpyUkf(FilterpyFilter):
 
     def _predicted(self, state: State) -> Any:  # noqa: ANN401 - filterpy is not typed
         kalman = filterpy_kalman()
-        points = kalman.JulierSigmaPoints(3, kappa=0.0, sqrt_method=square_root)
+        points = kalman.MerweScaledSigmaPoints(3, alpha=0.5, beta=2.25, kappa=0.0, sqrt_method=square_root)
         belief = kalman.UnscentedKalmanFilter(
             dim_x=3, dim_z=1, dt=0.0, hx=None, fx=lambda x, _: away(x, state.motion), points=points
         )

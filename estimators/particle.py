@@ -39,6 +39,10 @@ from fusion.screen import unusable
 
 KERNEL = 0.1
 """Width of the resampling kernel as a share of the cloud's own standard deviation (Liu & West: small, e.g. 0.1)."""
+BANDWIDTH = 0.3
+"""Extent of the place a particle stands for, as a share of the cloud's standard deviation: a wide cloud is thin, so a
+sharp reading is taken as blunt until the cloud has gathered (pre-regularisation: Musso, Oudjane & Le Gland 2001).
+"""
 X, Y, HEADING, DISTANCE_ERROR, TURN_ERROR, TURN_BIAS = range(6)
 """Rows of the cloud: pose [m, m, rad], relative errors of distance and turn, bias of the turn rate [rad/s]."""
 
@@ -114,8 +118,10 @@ class Particle:
         pose, covariance = moments(state.weights, *cloud[:3])
         antenna_m, fates, log_weights = self._world.robot.antenna_m, [], np.log(state.weights)
         for sighting in sightings(self._world, scan):
-            residual = sighting.value - sighting.expected_values(cloud[X], cloud[Y], cloud[HEADING], antenna_m)
-            likelihood, good = mixture(residual, total_variance(sighting), self._outlier_share)
+            expected = sighting.expected_values(cloud[X], cloud[Y], cloud[HEADING], antenna_m)
+            between = float(state.weights @ np.square(expected - state.weights @ expected))
+            variance = total_variance(sighting) + BANDWIDTH**2 * between
+            likelihood, good = mixture(sighting.value - expected, variance, self._outlier_share)
             log_weights = log_weights + np.log(likelihood)
             share = min(float(state.weights @ good), 1.0)
             fates.append(judged(scan, sighting, pose, covariance, antenna_m, share))

@@ -39,19 +39,23 @@ def mixture(residual: Array, variance: Array | float, outlier_share: float) -> t
 
 
 def total_variance(sighting: Sighting) -> float:
-    """Variance of a reading about its expectation: its own noise, and the common error of its anchor."""
-    return float(sighting.variance + sighting.model.bias_std**2)
+    """Variance of a reading about its expectation: its own noise, and the errors it shares with other readings of its
+    anchor, or of its kind; that of the kind grows with distance, which is taken from the reading itself.
+    """
+    model = sighting.model
+    by_gain = float(model.by_gain(model.distance(sighting.value)))
+    return float(sighting.variance + model.bias_std**2 + (by_gain * model.gain_std) ** 2)
 
 
 def moments(weights: Array, x: Array, y: Array, heading: Array) -> tuple[Pose, Covariance]:
-    """Weighted mean pose and covariance of points of one shape; the heading's mean is circular (Mardia & Jupp 2000,
-    section 2.2) and its deviations are wrapped.
+    """Weighted mean pose and covariance of points whose shapes broadcast to that of ``weights``. The heading's mean is
+    circular (Mardia & Jupp 2000, section 2.2), and its deviations are wrapped.
     """
     mean_x, mean_y = float(np.sum(weights * x)), float(np.sum(weights * y))
     mean_heading = math.atan2(float(np.sum(weights * np.sin(heading))), float(np.sum(weights * np.cos(heading))))
     dx, dy, turn = x - mean_x, y - mean_y, np.remainder(heading - mean_heading + np.pi, math.tau) - np.pi
     pairs = ((dx, dx), (dx, dy), (dx, turn), (dy, dy), (dy, turn), (turn, turn))
-    spread = Covariance(*(float(np.sum(weights * one * other)) for one, other in pairs))
+    spread = Covariance(*(float(np.sum(weights * (one * other))) for one, other in pairs))
     return Pose(mean_x, mean_y, wrap_angle(mean_heading)), spread
 
 

@@ -30,10 +30,10 @@ REFERENCE_DISTANCE_M = 0.1
 TIME_CORRELATION = 1.25
 """Errors of neighbouring scans are alike: 1.6 times the fitted sigma in all, sqrt(1 + 1.25^2)."""
 NOISE = {
-    # 0.10 of a step of 0.1 m; 0.40 of a commanded turn of 0.3 rad
+    # 0.10 of a step of 0.1 m; 0.40 of a commanded turn of up to 0.8 rad in a second
     "distance_std_per_sqrt_m": 0.03,
     "distance_std_per_sqrt_s": 0.005,
-    "turn_std_per_sqrt_rad": 0.2,
+    "turn_std_per_sqrt_rad": 0.35,
     "turn_std_per_sqrt_s": 0.03,
     "distance_scale_std": 0.05,
 }

@@ -41,10 +41,10 @@ TIME_CORRELATION = 1.25
 """Errors of neighbouring readings are alike: 1.6 times the fitted sigma in all, sqrt(1 + 1.25^2)."""
 RSSI_COLUMNS = {"rssi_3": "1", "rssi_4": "2", "rssi_5": "3", "rssi_8": "4", "rssi_10": "5", "rssi_11": "6"}
 NOISE = {
-    # 0.20 of a step of 0.03 m; 0.40 of a commanded turn of 0.13 rad
+    # 0.20 of a step of 0.03 m; 0.40 of a commanded turn of 0.4 rad (a third of a second)
     "distance_std_per_sqrt_m": 0.035,
     "distance_std_per_sqrt_s": 0.03,
-    "turn_std_per_sqrt_rad": 0.15,
+    "turn_std_per_sqrt_rad": 0.25,
     "turn_std_per_sqrt_s": 0.01,
     "turn_bias_std_rad_s": 0.0,
     "turn_scale_std": 0.05,

@@ -6,6 +6,7 @@ the noise of all others as it was.
 
 from __future__ import annotations
 
+import itertools
 import math
 import zlib
 from collections.abc import Iterator
@@ -195,7 +196,7 @@ class _Radio:
         """Walls between the anchor and a place."""
         here, there = (x, y), (self._anchor.x, self._anchor.y)
         walls = self._scenario.world.walls
-        return sum(_cross(here, there, a, b) for wall in walls for a, b in zip(wall, wall[1:], strict=False))
+        return sum(_cross(here, there, a, b) for wall in walls for a, b in itertools.pairwise(wall))
 
 
 Point = tuple[float, float]

@@ -32,7 +32,8 @@ def world(map_from_room=STILL, side_m=8.0):
     corners = np.array([map_from_room.transform(x, y) for x in (-1.0, side_m + 1.0) for y in (-1.0, side_m + 1.0)])
     (x_min, y_min), (x_max, y_max) = corners.min(axis=0), corners.max(axis=0)
     bounds = {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}
-    return World.from_table({"anchors": anchors, "bounds": bounds, "ranging": {"std_m": 0.2}})
+    ranging = {"std_m": 0.2, "bias_std_m": 0.0, "scale_std": 0.0}
+    return World.from_table({"anchors": anchors, "bounds": bounds, "ranging": ranging})
 
 
 def drive(seconds=20, outlier_at=None):

@@ -31,10 +31,11 @@ PLAIN_NOISE = {"distance_scale_std": 0.0, "turn_scale_std": 0.0, "turn_bias_std_
 START = Pose(4.0, 1.0, 0.2)
 
 
-def world(noise=PLAIN_NOISE, places=PLACES, antenna_m=(0.1, 0.05, 0.0)):
+def world(noise=PLAIN_NOISE, places=PLACES, antenna_m=(0.1, 0.05, 0.0), bias_std_m=0.1):
     anchors = [{"id": name, "position_m": list(place)} for name, place in places.items()]
     robot = {"noise": noise, "antenna_m": list(antenna_m)}
-    return World.from_table({"anchors": anchors, "robot": robot, "ranging": {"std_m": 0.2, "bias_std_m": 0.1}})
+    ranging = {"std_m": 0.2, "bias_std_m": bias_std_m, "scale_std": 0.0}
+    return World.from_table({"anchors": anchors, "robot": robot, "ranging": ranging})
 
 
 def drive(seconds=20, std=0.2, outlier_at=None, map_from_room=Pose(0.0, 0.0, 0.0)):
@@ -63,8 +64,8 @@ def radio_updates(estimator, place, measurements, start):
 
 
 def test_extended_filter_equals_ours_to_1e_9():
-    place, (measurements, _) = world(), drive(outlier_at=100)
-    ours = track(Ekf(place, estimate_anchor_bias=False), place, measurements, prior())
+    place, (measurements, _) = world(bias_std_m=0.0), drive(outlier_at=100)
+    ours = track(Ekf(place), place, measurements, prior())
     theirs = track(build("filterpy_ekf", place), place, measurements, prior())
     for own, other in zip(ours, theirs, strict=True):
         assert np.allclose(own.estimate.pose, other.estimate.pose, rtol=0, atol=1e-9)
@@ -108,15 +109,16 @@ def test_unscented_and_extended_filter_are_close_once_settled():
         assert math.dist(one.estimate.pose[:2], other.estimate.pose[:2]) < 0.02
 
 
-@BOTH
-def test_turning_and_shifting_the_world_turns_and_shifts_the_answer(name):
+# Sigma points lie along the map's axes while the spread is the same all around: second order makes a small difference.
+@pytest.mark.parametrize(("name", "tolerance"), [("filterpy_ekf", 1e-9), ("filterpy_ukf", 1e-3)])
+def test_turning_and_shifting_the_world_turns_and_shifts_the_answer(name, tolerance):
     turned = Pose(-3.0, 5.0, 2.2)
     place = world(places={anchor: turned.transform(*at) for anchor, at in PLACES.items()})
     measurements, _ = drive()
     plain = radio_updates(build(name, world()), world(), measurements, prior())
     moved = radio_updates(build(name, place), place, measurements, prior(turned.compose(START)))
     for before, after in zip(plain, moved, strict=True):
-        assert np.allclose(turned.compose(before.estimate.pose), after.estimate.pose, rtol=0, atol=1e-9)
+        assert np.allclose(turned.compose(before.estimate.pose), after.estimate.pose, rtol=0, atol=tolerance)
 
 
 @BOTH

@@ -31,7 +31,7 @@ START = Pose(4.0, 1.0, 0.2)
 
 def world():
     anchors = [{"id": name, "position_m": list(place)} for name, place in PLACES.items()]
-    return World.from_table({"anchors": anchors, "ranging": {"std_m": 0.2}})
+    return World.from_table({"anchors": anchors, "ranging": {"std_m": 0.2, "bias_std_m": 0.0, "scale_std": 0.0}})
 
 
 def drive(seconds=20, std=0.2, outlier_at=None):
