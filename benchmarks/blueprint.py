@@ -44,10 +44,11 @@ class Frame(NamedTuple):
         xs = [bounds.x_min, bounds.x_max, *(anchor.x for anchor in anchors)]
         ys = [bounds.y_min, bounds.y_max, *(anchor.y for anchor in anchors)]
         stamps = [measurement.time_ns for measurement in run.measurements]
-        if run.truth is not None and len(run.truth):
-            xs += [float(np.nanmin(run.truth.x)), float(np.nanmax(run.truth.x))]
-            ys += [float(np.nanmin(run.truth.y)), float(np.nanmax(run.truth.y))]
-            stamps += [int(run.truth.time_ns[0]), int(run.truth.time_ns[-1])]
+        if run.truth is not None:
+            known = np.isfinite(run.truth.x) & np.isfinite(run.truth.y)
+            xs += run.truth.x[known].tolist()
+            ys += run.truth.y[known].tolist()
+            stamps += run.truth.time_ns[known].tolist()
         return cls(min(xs), max(xs), min(ys), max(ys), min(stamps, default=0), max(stamps, default=0))
 
     @property
@@ -164,12 +165,11 @@ def _fates(frame: Frame, ranking: Sequence[Lane]) -> Any:  # noqa: ANN401
         if not any(update.fates for update in lane.updates):
             continue
         name = lane.name
-        # The colours are those of the readings above, which have a legend.
-        views = [
-            _plot(frame, f"{name}: weight of readings", rr.new_entity_path(["weight", name]), top=1.0, legend=False)
-        ]
+        weight = f"{name}: weight of readings, coloured as above"
+        views = [_plot(frame, weight, rr.new_entity_path(["weight", name]), top=1.0, legend=False)]
         if _tells_nis(lane):
-            views.append(_plot(frame, f"{name}: NIS of readings", rr.new_entity_path(["nis", name]), top=NIS_SHOWN))
+            nis = f"{name}: NIS of readings; the line is exceeded once in twenty"
+            views.append(_plot(frame, nis, rr.new_entity_path(["nis", name]), top=NIS_SHOWN, legend=False))
         tabs.append(rrb.Vertical(*views, name=name))
     return rrb.Tabs(contents=tabs, active_tab=0) if tabs else _plot(frame, "Weight of readings", "/weight")
 

@@ -116,8 +116,9 @@ def _headless_viewer(scene: Path) -> Iterator[Any]:
 def _connected(process: subprocess.Popen[bytes], port: int, errors: Path) -> Any | None:  # noqa: ANN401
     """The client once the viewer answers; raises `ViewerError` when the viewer has ended instead."""
     if process.poll() is not None:
-        said = errors.read_text(errors="replace").strip().splitlines()
-        raise ViewerError(f"{NO_DRIVER} (the viewer said: {said[-1] if said else 'nothing'})")
+        # Its first line is the cause; a long trace and where to report it follow.
+        said = errors.read_text(errors="replace").strip().partition("\n")[0]
+        raise ViewerError(f"{NO_DRIVER} (the viewer said: {said or 'nothing'})")
     from rerun.experimental import ViewerClient
 
     try:

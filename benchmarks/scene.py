@@ -59,19 +59,22 @@ class Canvas(NamedTuple):
             self.recording.send_columns(self.rr.new_entity_path(list(path)), [index], column)
 
     def plot(self, path: Sequence[str], name: str, colour: Colour, rows: Iterable[tuple[int, float]]) -> None:
-        """A dot per (time [ns], value); what is not finite is left out."""
+        """A dot per (time [ns], value)."""
         self._series(path, self.rr.SeriesPoints.from_fields(names=[name], colors=[colour], marker_sizes=[2.0]), rows)
 
-    def line(self, path: Sequence[str], name: str, colour: Colour, rows: Iterable[tuple[int, float]]) -> None:
-        """A line through (time [ns], value); what is not finite is left out."""
-        self._series(path, self.rr.SeriesLines.from_fields(names=[name], colors=[colour], widths=[1.5]), rows)
+    def line(
+        self, path: Sequence[str], name: str, colour: Colour, rows: Iterable[tuple[int, float]], *, shown: bool = True
+    ) -> None:
+        """A line through (time [ns], value), broken where a value is not finite; not shown: off in the legend."""
+        look = {"names": [name], "colors": [colour], "widths": [1.5], "visible_series": [shown]}
+        self._series(path, self.rr.SeriesLines.from_fields(**look), rows)
 
     def _series(self, path: Sequence[str], look: Any, rows: Iterable[tuple[int, float]]) -> None:  # noqa: ANN401
-        finite = [row for row in rows if math.isfinite(row[1])]
-        if finite:
-            time_ns, values = zip(*finite, strict=True)
+        values = [(time_ns, value if math.isfinite(value) else math.nan) for time_ns, value in rows]
+        if not all(math.isnan(value) for _, value in values):
             self.style(path, look)
-            self.columns(path, time_ns, self.rr.Scalars.columns(scalars=np.array(values)))
+            scalars = self.rr.Scalars.columns(scalars=[value for _, value in values])
+            self.columns(path, [time_ns for time_ns, _ in values], scalars)
 
 
 def write_scene(output: Path, run: Run, lanes: Sequence[Lane], scores: Sequence[Score]) -> Path:
@@ -98,7 +101,7 @@ def write_scene(output: Path, run: Run, lanes: Sequence[Lane], scores: Sequence[
     _draw_readings(canvas, run)
     for lane, score in zip(lanes, scores, strict=True):
         _draw_track(canvas, lane)
-        _draw_errors(canvas, run, score)
+        _draw_errors(canvas, run, score, shown=lane in ranking[:SHOWN])
         _draw_fates(canvas, frame, run.world, lane)
     canvas.style(["scores"], rr.TextDocument(markdown(scores), media_type="text/markdown"))
     recording.flush()
@@ -158,7 +161,7 @@ Rows = TypeVar("Rows", list[Estimate], NDArray[np.int64], NDArray[np.float64])
 
 def thinned(rows: Rows) -> Rows:
     """Every n-th of ``rows``, at most `MOST_POSES` of them."""
-    return rows[:: (len(rows) - 1) // MOST_POSES + 1]
+    return rows[:: max(math.ceil(len(rows) / MOST_POSES), 1)]
 
 
 def _draw_path(
@@ -226,15 +229,15 @@ def anchor_colour(world: World, anchor: str) -> Colour:
     return PALETTE[known.index(anchor) % len(PALETTE)] if anchor in known else GREY
 
 
-def _draw_errors(canvas: Canvas, run: Run, score: Score) -> None:
+def _draw_errors(canvas: Canvas, run: Run, score: Score, *, shown: bool) -> None:
     """Position error [m] and heading error [deg] at the instants the bench judges."""
     if run.truth is None or score.errors is None:
         return
     time_ns = evaluation_instants(run.truth).time_ns.tolist()
     name, colour = score.estimator, colour_of(score.estimator)
-    canvas.line(["error", name], name, colour, zip(time_ns, score.errors.position.tolist(), strict=True))
+    canvas.line(["error", name], name, colour, zip(time_ns, score.errors.position.tolist(), strict=True), shown=shown)
     degrees = np.degrees(score.errors.heading).tolist()
-    canvas.line(["heading_error", name], name, colour, zip(time_ns, degrees, strict=True))
+    canvas.line(["heading_error", name], name, colour, zip(time_ns, degrees, strict=True), shown=shown)
 
 
 def _draw_fates(canvas: Canvas, frame: Frame, world: World, lane: Lane) -> None:

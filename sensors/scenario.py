@@ -33,11 +33,11 @@ class Route:
 class Reality:
     """What the estimators are not told. Deviations are drawn once a run from the standard deviations given."""
 
-    anchor_offset_std_db: float = 2.0
-    shadowing_std_db: float = 3.0
+    anchor_offset_std_db: float = 1.0
+    shadowing_std_db: float = 2.0
     """Shadowing that belongs to the place [dB], alike over ``shadowing_length_m``."""
     shadowing_length_m: float = 2.0
-    fading_std_db: float = 2.0
+    fading_std_db: float = 1.5
     """Scan to scan [dB]."""
     wall_loss_db: float = 4.0
     deaf_below_dbm: float = -92.0
@@ -46,7 +46,7 @@ class Reality:
     """Mean excess of a range through walls [m]."""
     distance_scale_std: float = 0.02
     track_scale_std: float = 0.05
-    slip_std: float = 0.03
+    slip_std: float = 0.006
     """Wheel roll that does not become motion, as a share, drawn anew each half second."""
     gyro_bias_std_rad_s: float = 0.002
     gyro_noise_std_rad_s: float = 0.01

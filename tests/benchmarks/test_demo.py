@@ -1,0 +1,39 @@
+"""The whole promise in one command, cut short."""
+
+import json
+
+import fusion
+from benchmarks import demo as module
+from benchmarks.demo import demo
+from fusion import ViewerError
+from logs.reader import read_run
+
+
+def no_driver(*_, **__):
+    raise ViewerError("no driver here")
+
+
+def test_demo_leaves_log_scores_and_review_and_outlives_a_missing_driver(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(module, "render", no_driver)
+    made = demo(tmp_path / "demo", duration_s=6.0, workers=1)
+    assert read_run(made.log).truth is not None
+    records = json.loads(made.records.read_text())
+    assert {record["estimator"] for record in records} == set(fusion.names())
+    assert made.scene is not None
+    assert made.scene.stat().st_size > 0
+    assert made.picture is None
+    assert "no picture: no driver here" in capsys.readouterr().err
+
+
+def test_command_prints_the_table_the_files_and_three_commands_to_try(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(module, "review", no_driver)
+    short = {"duration_s": 6.0, "workers": 1}
+    monkeypatch.setattr(module, "demo", lambda folder, *, seed: demo(folder, seed=seed, **short))
+    from fusion.cli import main
+
+    assert main(["demo", "-o", str(tmp_path / "demo"), "--no-view"]) == 0
+    told = capsys.readouterr()
+    assert "position error of" in told.out
+    assert str(tmp_path / "demo" / "run.mcap") in told.out
+    assert told.out.split("Try next:")[1].count("fusion ") == 3
+    assert "no review: no driver here" in told.err
