@@ -143,7 +143,7 @@ class Tracker:
                 name = type(self._estimator).__name__
                 raise PluginError(
                     f"{name} failed on {type(item).__name__} of {item.sensor!r} at {item.time_ns} ns: {error!r}; "
-                    f"check it with `fusion check`"
+                    "leave it out with --estimators, or report it to its author"
                 ) from error
             fates += more
         return _Moment(odometer, belief), fates

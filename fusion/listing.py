@@ -1,0 +1,48 @@
+"""`fusion estimators`: what is installed, with every parameter. One broken plug-in does not hide the others."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import Any
+
+from fusion.errors import PluginError
+from fusion.plugins import load, names, parameters
+
+
+def installed() -> list[dict[str, Any]]:
+    """One entry per installed estimator: name, summary, tags, parameters; or name and error."""
+    return [_entry(name) for name in names()]
+
+
+def _entry(name: str) -> dict[str, Any]:
+    try:
+        made = load(name)
+    except PluginError as error:
+        return {"name": name, "error": str(error)}
+    options = [
+        {"name": key, "type": getattr(item.annotation, "__name__", str(item.annotation)), "default": item.default}
+        for key, item in parameters(made).items()
+    ]
+    return {"name": name, "summary": made.summary, "tags": sorted(t.value for t in made.tags), "parameters": options}
+
+
+def _text(entry: dict[str, Any]) -> str:
+    if "error" in entry:
+        return f"{entry['name']}: cannot be used: {entry['error']}\n"
+    tags = f" [{', '.join(entry['tags'])}]" if entry["tags"] else ""
+    rows = "".join(f"    {p['name']}: {p['type']} = {p['default']!r}\n" for p in entry["parameters"])
+    return f"{entry['name']}: {entry['summary']}{tags}\n{rows}"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Arguments of `fusion estimators`."""
+    parser.add_argument("--json", action="store_true", help="as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """List what is installed."""
+    entries = installed()
+    sys.stdout.write(json.dumps(entries, indent=2) + "\n" if arguments.json else "".join(map(_text, entries)))
+    return 0

@@ -1,0 +1,99 @@
+"""`fusion info`: what is in a log, and whether anything is wrong with it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections import defaultdict
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from fusion.values import seconds
+from logs.reader import read_run
+from logs.run import Run
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """Everything `fusion info` tells, as plain values: times in seconds, rates in hertz."""
+    run = read_run(path)
+    return {
+        "path": str(path),
+        "name": run.name,
+        "world": run.world.name,
+        "world_hash": run.world.hash,
+        "anchors": [anchor.id for anchor in run.world.anchors],
+        "duration_s": _duration_s(run),
+        "channels": _channels(run),
+        "truth": 0 if run.truth is None else len(run.truth),
+        "prior": None if run.prior is None else [*run.prior.pose],
+        "heading_known": run.prior is not None and run.prior.heading_known,
+        "estimators": {name: len(estimates) for name, estimates in run.lanes.items()},
+        "metadata": dict(run.metadata),
+        "warnings": list(run.warnings),
+    }
+
+
+def _duration_s(run: Run) -> float:
+    times = [measurement.time_ns for measurement in run.measurements]
+    return seconds(max(times) - min(times)) if times else 0.0
+
+
+def _channels(run: Run) -> list[dict[str, Any]]:
+    """One row per sensor: how much, how often, the longest gap, and stamps that ran backwards."""
+    by_sensor: dict[tuple[str, str], list[int]] = defaultdict(list)
+    for measurement in run.measurements:
+        by_sensor[type(measurement).__name__, measurement.sensor].append(measurement.time_ns)
+    rows = []
+    for (kind, sensor), times in sorted(by_sensor.items()):
+        span_s = seconds(max(times) - min(times))
+        gaps = [later - earlier for earlier, later in pairwise(times)]
+        rows.append(
+            {
+                "kind": kind,
+                "sensor": sensor,
+                "count": len(times),
+                "rate_hz": (len(times) - 1) / span_s if span_s > 0.0 else None,
+                "longest_gap_s": seconds(max(gaps, default=0)),
+                "out_of_order": sum(gap < 0 for gap in gaps),
+            }
+        )
+    return rows
+
+
+def _text(about: dict[str, Any]) -> str:
+    """The same for a reader."""
+    lines = [
+        f"{about['name']}: {about['duration_s']:.1f} s in the world {about['world']!r} ({about['world_hash'][:12]})"
+    ]
+    lines.append(f"anchors: {', '.join(about['anchors']) or 'none'}")
+    for row in about["channels"]:
+        rate = "once" if row["rate_hz"] is None else f"{row['rate_hz']:.2f} Hz"
+        late = f", {row['out_of_order']} out of order" if row["out_of_order"] else ""
+        gap = f"longest gap {row['longest_gap_s']:.2f} s"
+        lines.append(f"  {row['kind']:<12} {row['sensor']:<12} {row['count']:>7}  {rate:>10}  {gap}{late}")
+    lines.append(f"truth: {about['truth']} poses" if about["truth"] else "truth: none, so errors cannot be scored")
+    if about["prior"] is None:
+        lines.append("start: none in the log")
+    else:
+        x, y, heading = about["prior"]
+        turned = f"{math.degrees(heading):.1f}°" if about["heading_known"] else "unknown"
+        lines.append(f"start: x {x:.2f} m, y {y:.2f} m, heading {turned}")
+    lines += [f"estimates of {name}: {count}" for name, count in about["estimators"].items()]
+    lines += [f"warning: {warning}" for warning in about["warnings"]]
+    return "\n".join(lines) + "\n"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Arguments of `fusion info`."""
+    parser.add_argument("run", metavar="RUN", type=Path, help="the log")
+    parser.add_argument("--json", action="store_true", help="as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Tell what is in the log."""
+    about = describe(arguments.run)
+    sys.stdout.write(json.dumps(about, indent=2) + "\n" if arguments.json else _text(about))
+    return 0
