@@ -48,5 +48,5 @@ def run_lane(run: Run, estimator: str, options: Mapping[str, object] | None = No
     except FusionError as known:
         error = str(known)
     except Exception as unknown:  # noqa: BLE001 - a plug-in may fail in any way, and costs only its own lane
-        error = f"{estimator} failed: {unknown!r}; check it with `fusion check {estimator}`"
+        error = f"{estimator} failed: {unknown!r}; leave it out with --estimators"
     return Lane(estimator, tuple(updates), certificate, cpu_s, error)

@@ -44,6 +44,8 @@ from fusion.values import nanoseconds
 Array = NDArray[np.float64]
 USED_FROM = 0.5
 """A fix more likely good than not counts as used."""
+LARGEST_EXPONENT = 600.0
+"""exp of more is near the end of what a float holds; an outlier is certain long before."""
 
 
 class State(NamedTuple):
@@ -53,6 +55,7 @@ class State(NamedTuple):
     covariance: Covariance
     motion: Increment
     recent: Recent
+    position_known: bool
 
 
 class BayesWeight:
@@ -83,7 +86,7 @@ class BayesWeight:
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
         """The prior, no motion yet."""
-        return State(*starting_belief(self._world, prior), Increment(), ())
+        return State(*starting_belief(self._world, prior), Increment(), (), prior.position_known)
 
     def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
         """Gather motion; weigh a fix in when there is one."""
@@ -97,28 +100,29 @@ class BayesWeight:
         if isinstance(fix, Reason):
             return state._replace(recent=recent), unusable(measurement, fix)
         pose, covariance = compose(state.pose, state.covariance, state.motion)
-        moved, moved_covariance, good = self.weigh(pose, covariance, fix)
+        moved, moved_covariance, good = self.weigh(pose, covariance, fix, position_known=state.position_known)
         fates = self._fates(measurement, seen, pose, covariance, good)
-        return State(moved, moved_covariance, Increment(), ()), fates
+        return State(moved, moved_covariance, Increment(), (), position_known=True), fates
 
     def estimate(self, state: State, time_ns: int) -> Estimate:
-        """The pose after the motion since the last fix."""
+        """The pose after the motion since the last fix; not valid from an unknown position before the first fix."""
         pose, covariance = compose(state.pose, state.covariance, state.motion)
-        return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
+        known = covariance.hh < HEADING_KNOWN_STD**2
+        return Estimate(time_ns, pose, covariance, valid=state.position_known, heading_known=known)
 
-    def weigh(self, pose: Pose, covariance: Covariance, fix: Fix) -> tuple[Pose, Covariance, float]:
-        """Pose, covariance, and the posterior probability that ``fix`` is good."""
+    def weigh(
+        self, pose: Pose, covariance: Covariance, fix: Fix, *, position_known: bool = True
+    ) -> tuple[Pose, Covariance, float]:
+        """Pose, covariance, and the posterior probability that ``fix`` is good.
+
+        A position that may be anywhere on the floor expects a good fix no less than an outlier there, so that
+        probability is then the prior one.
+        """
         p, r = np.array(covariance.matrix), np.array([[fix.xx, fix.xy], [fix.xy, fix.yy]])
         innovation, h = self._innovation(pose, fix)
         s = h @ p @ h.T + r
-        inverse = np.linalg.inv(s)
-        likelihood = math.exp(-0.5 * float(innovation @ inverse @ innovation)) / math.sqrt(
-            math.tau**2 * float(np.linalg.det(s))
-        )
-        good_share = (1.0 - self._outlier_probability) * likelihood
-        total = good_share + self._outlier_probability * self._outlier_density
-        good = good_share / total if total > 0.0 else 0.0
-        gain = p @ h.T @ inverse
+        good = self._probability_good(innovation, s) if position_known else 1.0 - self._outlier_probability
+        gain = p @ h.T @ np.linalg.inv(s)
         # Moment matching: P - beta K S Kᵀ + beta (1 - beta) (K nu)(K nu)ᵀ, and the mean moves by beta K nu.
         jump = gain @ innovation
         p = p - good * gain @ s @ gain.T + good * (1.0 - good) * np.outer(jump, jump)
@@ -126,6 +130,14 @@ class BayesWeight:
         cells = (0.5 * (p + p.T)).tolist()
         spread = Covariance(cells[0][0], cells[0][1], cells[0][2], cells[1][1], cells[1][2], cells[2][2])
         return Pose(x, y, wrap_angle(heading)), spread, good
+
+    def _probability_good(self, innovation: Array, s: Array) -> float:
+        """Bayes' rule for two cases: N(innovation; 0, S) if good, uniform over the floor if an outlier."""
+        half_nis = 0.5 * float(innovation @ np.linalg.solve(s, innovation))
+        peak = 1.0 / (math.tau * math.sqrt(float(np.linalg.det(s))))
+        prior_odds = self._outlier_probability / (1.0 - self._outlier_probability)
+        odds = prior_odds * self._outlier_density / peak * math.exp(min(half_nis, LARGEST_EXPONENT))
+        return 1.0 / (1.0 + odds)
 
     def _innovation(self, pose: Pose, fix: Fix) -> tuple[Array, Array]:
         """Fix minus predicted antenna position [m], and its Jacobian by the pose, (2, 3)."""

@@ -27,6 +27,7 @@ from fusion import (
     sightings,
     wrap_angle,
 )
+from fusion.belief import starting_belief
 from fusion.errors import did_you_mean
 from fusion.fix import Recent, fix_from, remember
 from fusion.screen import unusable
@@ -109,7 +110,8 @@ class DynamicWeight:
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
         """Algorithm 1, line 1: both weights 0.5, the counter 0, odometry at the start."""
-        return State(prior.pose, prior.pose, 0.5, 0, 0.0, (), prior.position_known, prior.heading_known)
+        pose, _ = starting_belief(self._world, prior)
+        return State(pose, pose, 0.5, 0, 0.0, (), prior.position_known, prior.heading_known)
 
     def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
         """Odometry moves both positions; a fix is weighed in."""
@@ -146,10 +148,11 @@ class DynamicWeight:
     def _fuse(
         self, state: State, fix: tuple[float, float], scan: WifiScan | Ranges, seen: tuple[Sighting, ...]
     ) -> tuple[State, tuple[Fate, ...]]:
-        """Algorithm 1, lines 4 to 6."""
-        x, y, heading = state.odometry
+        """Algorithm 1, lines 4 to 6. From an unknown position, odometry starts at the first fix."""
+        expected_from = state.odometry if state.position_known else None
         if not state.position_known:
-            x, y = fix
+            state = state._replace(odometry=Pose(*fix, state.odometry.heading))
+        x, y, heading = state.odometry
         outlier = self._is_outlier(fix, (x, y), state.travelled_m)
         wifi_weight, counter = self.allocate(outlier=outlier, odo_counter=state.odo_counter)
         odo_weight = 1.0 - wifi_weight
@@ -163,7 +166,7 @@ class DynamicWeight:
             recent=(),
             position_known=True,
         )
-        return after, self._fates(scan, seen, Pose(x, y, heading), wifi_weight, outlier=outlier)
+        return after, self._fates(scan, seen, expected_from, wifi_weight, outlier=outlier)
 
     def allocate(self, *, outlier: bool, odo_counter: int) -> tuple[float, int]:
         """Algorithm 2: the weight of the Wi-Fi fix and the new odoCounter; w_odo = 1 - w_Wi-Fi."""
@@ -186,8 +189,15 @@ class DynamicWeight:
         return away > self._share * math.hypot(bounds.x_max - bounds.x_min, bounds.y_max - bounds.y_min)
 
     def _fates(
-        self, scan: WifiScan | Ranges, seen: tuple[Sighting, ...], odometry: Pose, weight: float, *, outlier: bool
+        self,
+        scan: WifiScan | Ranges,
+        seen: tuple[Sighting, ...],
+        odometry: Pose | None,
+        weight: float,
+        *,
+        outlier: bool,
     ) -> tuple[Fate, ...]:
+        """One per anchor, with w_Wi-Fi as weight; no innovation where odometry expected nothing (None)."""
         verdict = (Decision.REJECTED, Reason.OUTLIER) if outlier else (Decision.USED, Reason.OK)
         antenna = self._world.robot.antenna_m
         return tuple(
@@ -198,7 +208,7 @@ class DynamicWeight:
                 item.anchor.id,
                 *verdict,
                 weight,
-                item.value - item.expect(odometry.x, odometry.y, odometry.heading, antenna).value,
+                None if odometry is None else item.value - item.expect(*odometry, antenna).value,
             )
             for item in seen
         )
