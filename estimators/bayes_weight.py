@@ -4,6 +4,9 @@ Each radio fix is either good, with the covariance of its trilateration, or an o
 weight of the fix is the Kalman gain of a good one times the posterior probability that it is good: the probabilistic
 data association filter with one measurement (Bar-Shalom, Li & Kirubarajan 2001, section 6.4; Bar-Shalom & Tse 1975).
 The posterior of the two cases is moment-matched, so the covariance grows when they disagree.
+
+Successive fixes count as independent. Errors that stay, anchor biases and odometry calibration, are not in its state:
+where they are large it is more certain than it should be.
 """
 
 from __future__ import annotations

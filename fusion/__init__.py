@@ -5,6 +5,7 @@ Everything a user or plug-in author needs is imported from here; estimators and 
 
 from fusion.certificate import digest
 from fusion.errors import (
+    ConformanceError,
     FusionError,
     LogError,
     MeasurementError,
@@ -44,6 +45,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Anchor",
     "Bounds",
+    "ConformanceError",
     "Covariance",
     "Decision",
     "Estimate",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import struct
 from collections.abc import Iterable
 
@@ -16,6 +15,8 @@ def _numbers(*values: float | None) -> bytes:
 
 def digest(updates: Iterable[Update]) -> str:
     """SHA-256 of every estimate and fate of ``updates``, in order, as hexadecimal text."""
+    import hashlib
+
     total = hashlib.sha256()
     for update in updates:
         estimate = update.estimate

@@ -33,6 +33,7 @@ VERBS = {
     "replay": Verb("benchmarks.replay", "run one estimator over a log and record what it said"),
     "review": Verb("benchmarks.review", "see a run and its estimators in Rerun"),
     "estimators": Verb("fusion.listing", "what estimators are installed, and their parameters"),
+    "check": Verb("fusion.check", "hold an estimator against the contract"),
 }
 
 

@@ -7,6 +7,7 @@
     ├── MeasurementError  a measurement breaks the contract                → fix the driver or the log
     ├── LogError          a file cannot be read as a run                   → repair it, or give another file
     ├── RecordingError    a foreign recording cannot be imported           → compare the folder with the docs
+    ├── ConformanceError  an estimator breaks a promise of the contract    → fix the estimator
     └── ViewerError       the Rerun viewer cannot be used here             → install what the message names
 
 ``except FusionError`` catches them all. A message says what, which value, where, and what to do next.
@@ -14,7 +15,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 
@@ -46,6 +46,10 @@ class RecordingError(FusionError):
     """A foreign recording cannot be imported."""
 
 
+class ConformanceError(FusionError):
+    """An estimator breaks a promise of the contract; the message is the counter-example."""
+
+
 class ViewerError(FusionError):
     """The Rerun viewer cannot be used on this machine."""
 
@@ -58,6 +62,8 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     >>> did_you_mean("zzz", ["ekf", "particle"])
     'known: ekf, particle'
     """
+    import difflib
+
     candidates = sorted(known)
     near = difflib.get_close_matches(name, candidates, n=1, cutoff=0.6)
     if near:

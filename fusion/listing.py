@@ -18,9 +18,14 @@ def installed() -> list[dict[str, Any]]:
 
 def _entry(name: str) -> dict[str, Any]:
     try:
-        made = load(name)
+        return _description(name, load(name))
     except PluginError as error:
         return {"name": name, "error": str(error)}
+    except Exception as error:  # noqa: BLE001 - a stranger's class may lack or break anything
+        return {"name": name, "error": f"it is no estimator: {error!r}; it needs summary, tags and typed parameters"}
+
+
+def _description(name: str, made: Any) -> dict[str, Any]:  # noqa: ANN401 - whatever the entry point names
     options = [
         {"name": key, "type": getattr(item.annotation, "__name__", str(item.annotation)), "default": item.default}
         for key, item in parameters(made).items()
@@ -44,5 +49,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """List what is installed."""
     entries = installed()
-    sys.stdout.write(json.dumps(entries, indent=2) + "\n" if arguments.json else "".join(map(_text, entries)))
+    sys.stdout.write(
+        json.dumps(entries, indent=2, default=str) + "\n" if arguments.json else "".join(map(_text, entries))
+    )
     return 0

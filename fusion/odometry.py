@@ -14,9 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fusion.errors import MeasurementError
 from fusion.geometry import wrap_angle
 from fusion.values import Gyro, Measurement, MotorCommand, Odometry, WheelTicks, nanoseconds, seconds
-from fusion.world import Robot
+from fusion.world import DRIVES, Robot
 
 MAX_HOLD_NS = nanoseconds(0.5)
 """Longest time a twist is held without new odometry, unless odometry itself comes more slowly."""
@@ -101,18 +102,30 @@ class Odometer:
         return OdometerState(covered_ns=time_ns, last_ns=time_ns)
 
     def advance(self, state: OdometerState, measurement: Measurement) -> tuple[OdometerState, tuple[Measurement, ...]]:
-        """The measurements an estimator should see in place of ``measurement``, in order."""
+        """The measurements an estimator should see in place of ``measurement``, in order.
+
+        Raises `MeasurementError` when it tells of more or fewer wheels than the robot has.
+        """
         if isinstance(measurement, Odometry):
             return self._real(state, measurement)
         if isinstance(measurement, WheelTicks):
             return self._ticks(state, measurement)
         if isinstance(measurement, MotorCommand):
+            self._require_wheels(len(measurement.wheel_speeds_m_s), measurement)
             forward = tuple(-1 if speed < 0.0 else 1 for speed in measurement.wheel_speeds_m_s)
             return replace(state, forward=forward), ()
         if isinstance(measurement, Gyro):
             return self._gyro(state, measurement)
         state, motion = self.hold(state, measurement.time_ns)
         return state, (*motion, measurement)
+
+    def _require_wheels(self, count: int, measurement: WheelTicks | MotorCommand) -> None:
+        wheels = DRIVES[self.robot.drive]
+        if count != wheels:
+            raise MeasurementError(
+                f"{type(measurement).__name__} of {measurement.sensor!r} at {measurement.time_ns} ns tells of {count} "
+                f"wheels, the world's {self.robot.drive} drive has {wheels}; correct robot.drive, or the driver"
+            )
 
     def hold(self, state: OdometerState, time_ns: int) -> tuple[OdometerState, tuple[Odometry, ...]]:
         """Motion up to ``time_ns`` on the last twist known; past the longest hold, unmeasured motion."""
@@ -162,8 +175,9 @@ class Odometer:
         ), (remaining,)
 
     def _ticks(self, state: OdometerState, ticks: WheelTicks) -> tuple[OdometerState, tuple[Odometry, ...]]:
+        self._require_wheels(len(ticks.counts), ticks)
         before, counted = state.counts, replace(state, counts=ticks.counts)
-        if before is None or len(before) != len(ticks.counts):
+        if before is None:
             angle = state.gyro.at(ticks.time_ns) if state.gyro else 0.0
             return replace(counted, last_ns=ticks.time_ns, gyro_angle_at_last=angle), ()
         signs = state.forward if self.robot.encoder == "single_channel" and state.forward else (1,) * len(before)

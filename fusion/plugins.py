@@ -10,7 +10,6 @@ A plug-in distribution declares, for instance,
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ from fusion.errors import FusionError, ParameterError, PluginError, did_you_mean
 from fusion.estimator import Estimator
 
 if TYPE_CHECKING:
+    import inspect
     from importlib.metadata import EntryPoint
 
     from fusion.world import World
@@ -80,6 +80,8 @@ def _import(entry: EntryPoint) -> Any:  # noqa: ANN401
 
 def parameters(estimator: type[Any]) -> dict[str, inspect.Parameter]:
     """The parameters an estimator class takes beside the world, by name."""
+    import inspect
+
     return dict(list(inspect.signature(estimator, eval_str=True).parameters.items())[1:])
 
 

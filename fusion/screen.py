@@ -48,6 +48,8 @@ def screen(world: World, measurement: Measurement) -> tuple[Measurement | None, 
     if isinstance(measurement, WifiScan | Ranges):
         return _screen_radio(world, measurement)
     if isinstance(measurement, Odometry):
+        if measurement.from_ns > measurement.time_ns:
+            return None, unusable(measurement, Reason.BAD_CLOCK)
         numbers: tuple[float, ...] = (measurement.distance_m, measurement.turn_rad)
     elif isinstance(measurement, Gyro):
         numbers = (measurement.rate_rad_s,)

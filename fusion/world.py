@@ -8,8 +8,6 @@ Unknown keys are refused with the nearest match; anchors that make positioning i
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -139,19 +137,29 @@ class World:
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> World:
         """A world from nested tables, as TOML or JSON gives them."""
+        import hashlib
+        import json
+
         known = {"name", "provenance", "anchors", "radio", "ranging", "robot", "bounds", "walls"}
         check_keys(table, dict.fromkeys(known), "world")
         robot = read_record(Robot, table.get("robot", {}), "robot")
         _check_robot(robot)
+        read_record(PathLoss, table.get("radio", {}), "radio")
+        read_record(Ranging, table.get("ranging", {}), "ranging")
         anchors = _read_anchors(table, robot.antenna_m[2])
+        bounds = _read_bounds(table, anchors)
+        name = read_value(str, table.get("name", "unnamed"), "name")
+        walls = read_value(tuple[Wall, ...], table.get("walls", ()), "walls")
+        provenance = read_value(str, table.get("provenance", ""), "provenance")
+        # Only now: every value is known to be one that JSON can tell (TOML also has dates).
         text = json.dumps(table, sort_keys=True, separators=(",", ":"))
         return cls(
-            name=read_value(str, table.get("name", "unnamed"), "name"),
+            name=name,
             anchors=anchors,
             robot=robot,
-            bounds=_read_bounds(table, anchors),
-            walls=read_value(tuple[Wall, ...], table.get("walls", ()), "walls"),
-            provenance=read_value(str, table.get("provenance", ""), "provenance"),
+            bounds=bounds,
+            walls=walls,
+            provenance=provenance,
             hash=hashlib.sha256(text.encode()).hexdigest(),
             table=text,
         )
@@ -186,8 +194,8 @@ def _read_anchor(row: Any, world: Mapping[str, Any], antenna_height_m: float, wh
         x=position[0],
         y=position[1],
         z=position[2] if len(position) == 3 else antenna_height_m,
-        radio=read_record(PathLoss, {**world.get("radio", {}), **row.get("radio", {})}, f"{where}.radio"),
-        ranging=read_record(Ranging, {**world.get("ranging", {}), **row.get("ranging", {})}, f"{where}.ranging"),
+        radio=read_record(PathLoss, {**world.get("radio", {}), **_own(row, "radio", where)}, f"{where}.radio"),
+        ranging=read_record(Ranging, {**world.get("ranging", {}), **_own(row, "ranging", where)}, f"{where}.ranging"),
     )
     for name, model, keys in (
         ("radio", anchor.radio, ("frequency_hz", "path_loss_exponent", "reference_distance_m", "shadowing_std_db")),
@@ -195,6 +203,14 @@ def _read_anchor(row: Any, world: Mapping[str, Any], antenna_height_m: float, wh
     ):
         _require_positive(model, keys, f"{where}.{name}")
     return anchor
+
+
+def _own(row: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
+    """An anchor's own radio or ranging table; what it lacks comes from the world's."""
+    table = row.get(key, {})
+    if not isinstance(table, Mapping):
+        raise WorldError(f"{where}.{key}: expected a table of names and values, got {table!r}")
+    return table
 
 
 def _require_positive(record: object, keys: tuple[str, ...], where: str) -> None:

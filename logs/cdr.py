@@ -18,7 +18,9 @@ class Packer:
         self._bytes = bytearray()
 
     def put(self, code: str, *values: float) -> Packer:
-        """Numbers of one type, by their `struct` letter."""
+        """Numbers of one type, by their `struct` letter. None at all take no room, not even for alignment."""
+        if not values:
+            return self
         size = struct.calcsize("<" + code)
         self._bytes += b"\0" * (-len(self._bytes) % size)
         self._bytes += struct.pack(f"<{len(values)}{code}", *values)
@@ -47,6 +49,8 @@ class Unpacker:
 
     def take(self, code: str, count: int) -> tuple[float, ...]:
         """``count`` numbers of one type."""
+        if count == 0:
+            return ()
         size = struct.calcsize("<" + code)
         self._at += -self._at % size
         values = struct.unpack_from(f"<{count}{code}", self._body, self._at)

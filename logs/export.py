@@ -7,13 +7,13 @@ import csv
 import json
 import math
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from fusion import Estimate, Gyro, LogError, Odometry, Ranges, WheelTicks, WifiScan
 from fusion.values import NANOSECONDS
 from logs.reader import read_run
-from logs.run import Run
+from logs.run import Run, TruthTrack
 
 Cell = str | float | int
 
@@ -29,7 +29,10 @@ def seconds_text(time_ns: int) -> str:
 
 
 def export_csv(path: Path, folder: Path) -> list[Path]:
-    """Write the CSV bundle of a log into ``folder``; answers the files. Numbers keep every digit."""
+    """Write the CSV bundle of a log into ``folder``; answers the files. Numbers keep every digit.
+
+    The bundle has no place for motor commands, the ages of readings in a scan, the prior, and names of sensors.
+    """
     run = read_run(path)
     world = folder / "world.toml"
     _write_world(run, world)
@@ -77,38 +80,42 @@ def _tables(run: Run) -> Iterable[tuple[str, list[str], list[Sequence[Cell]]]]:
         ["time_s", "anchor", "rssi_dbm"],
         [(seconds_text(m.time_ns), r.anchor, r.rssi_dbm) for m in kinds if isinstance(m, WifiScan) for r in m.readings],
     )
-    yield "truth.csv", ["time_s", "x_m", "y_m", "heading_rad"], _truth_rows(run)
+    poses = () if run.truth is None else _truth(run.truth)
+    yield (
+        "truth.csv",
+        ["time_s", "x_m", "y_m", "heading_rad"],
+        [(seconds_text(t), x, y, "" if math.isnan(heading) else heading) for t, x, y, heading in poses],
+    )
 
 
-def _truth_rows(run: Run) -> list[Sequence[Cell]]:
-    if run.truth is None:
-        return []
-    columns = (column.tolist() for column in (run.truth.time_ns, run.truth.x, run.truth.y, run.truth.heading))
-    return [(seconds_text(t), x, y, "" if math.isnan(h) else h) for t, x, y, h in zip(*columns, strict=True)]
+def _truth(track: TruthTrack) -> Iterator[tuple[int, float, float, float]]:
+    columns = (track.time_ns, track.x, track.y, track.heading)
+    return zip(*(column.tolist() for column in columns), strict=True)
 
 
 def export_tum(path: Path, folder: Path) -> list[Path]:
-    """Write truth and recorded estimates as TUM files (time x y z qx qy qz qw) into ``folder``; answers the files."""
+    """Write truth and recorded estimates as TUM files (time x y z qx qy qz qw) into ``folder``; answers the files.
+
+    The format has no way to leave the heading out: one that is not known is written as zero.
+    """
     run = read_run(path)
-    tracks = {name: [_tum(e.time_ns, *e.pose) for e in estimates] for name, estimates in _valid(run).items()}
+    tracks = {name: [_tum(e.time_ns, *e.pose) for e in _last_words(lane)] for name, lane in run.lanes.items()}
     if run.truth is not None:
-        tracks["truth"] = [_tum(*_timed(row)) for row in _truth_rows(run)]
+        tracks["truth"] = [_tum(*row) for row in _truth(run.truth)]
     if not tracks:
         raise LogError(f"{path}: holds neither truth nor estimates; add estimates with `fusion replay`")
     return [_write(folder / f"{name}.tum", None, rows, separator=" ") for name, rows in tracks.items()]
 
 
-def _valid(run: Run) -> dict[str, list[Estimate]]:
-    return {name: [estimate for estimate in lane if estimate.valid] for name, lane in run.lanes.items()}
-
-
-def _timed(row: Sequence[Cell]) -> tuple[int, float, float, float]:
-    whole, part = str(row[0]).split(".")
-    return int(whole) * NANOSECONDS + int(part), float(row[1]), float(row[2]), float(row[3] or 0.0)
+def _last_words(lane: Sequence[Estimate]) -> list[Estimate]:
+    """In time order; of an estimate that late data made the estimator revise, the revision."""
+    by_time = {estimate.time_ns: estimate for estimate in lane}
+    return [by_time[time_ns] for time_ns in sorted(by_time)]
 
 
 def _tum(time_ns: int, x: float, y: float, heading: float) -> Sequence[Cell]:
-    return (seconds_text(time_ns), x, y, 0.0, 0.0, 0.0, math.sin(0.5 * heading), math.cos(0.5 * heading))
+    half = 0.0 if math.isnan(heading) else 0.5 * heading
+    return (seconds_text(time_ns), x, y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
 
 
 def _write(path: Path, header: list[str] | None, rows: Iterable[Sequence[Cell]], *, separator: str = ",") -> Path:

@@ -29,6 +29,7 @@ def describe(path: Path) -> dict[str, Any]:
         "channels": _channels(run),
         "truth": 0 if run.truth is None else len(run.truth),
         "prior": None if run.prior is None else [*run.prior.pose],
+        "position_known": run.prior is not None and run.prior.position_known,
         "heading_known": run.prior is not None and run.prior.heading_known,
         "estimators": {name: len(estimates) for name, estimates in run.lanes.items()},
         "metadata": dict(run.metadata),
@@ -49,7 +50,7 @@ def _channels(run: Run) -> list[dict[str, Any]]:
     rows = []
     for (kind, sensor), times in sorted(by_sensor.items()):
         span_s = seconds(max(times) - min(times))
-        gaps = [later - earlier for earlier, later in pairwise(times)]
+        gaps = [later - earlier for earlier, later in pairwise(sorted(times))]
         rows.append(
             {
                 "kind": kind,
@@ -57,7 +58,7 @@ def _channels(run: Run) -> list[dict[str, Any]]:
                 "count": len(times),
                 "rate_hz": (len(times) - 1) / span_s if span_s > 0.0 else None,
                 "longest_gap_s": seconds(max(gaps, default=0)),
-                "out_of_order": sum(gap < 0 for gap in gaps),
+                "out_of_order": sum(later < earlier for earlier, later in pairwise(times)),
             }
         )
     return rows
@@ -80,7 +81,8 @@ def _text(about: dict[str, Any]) -> str:
     else:
         x, y, heading = about["prior"]
         turned = f"{math.degrees(heading):.1f}°" if about["heading_known"] else "unknown"
-        lines.append(f"start: x {x:.2f} m, y {y:.2f} m, heading {turned}")
+        place = f"x {x:.2f} m, y {y:.2f} m" if about["position_known"] else "position unknown"
+        lines.append(f"start: {place}, heading {turned}")
     lines += [f"estimates of {name}: {count}" for name, count in about["estimators"].items()]
     lines += [f"warning: {warning}" for warning in about["warnings"]]
     return "\n".join(lines) + "\n"

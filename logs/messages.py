@@ -2,13 +2,14 @@
 
 Standard ROS 2 types where one exists, a few `fusion_msgs` of our own where none does. The stamp holds the time a
 measurement was true, ``frame_id`` the sensor's name, the MCAP sequence number its ``seq``. Numbers are doubles and
-come back to the bit, but for headings that pass through a quaternion.
+come back to the bit, but for headings that pass through a quaternion; the prior's is kept in the log's metadata too,
+because a replay starts from it. An all-zero quaternion says that the heading is not known.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from fusion import (
@@ -16,6 +17,7 @@ from fusion import (
     Estimate,
     Fate,
     Gyro,
+    LogError,
     Measurement,
     MotorCommand,
     Odometry,
@@ -70,7 +72,13 @@ NOT_GIVEN = -1.0
 """First element of a covariance that says there is none (the convention of sensor_msgs/Imu)."""
 
 
+END_OF_TIME_NS = 2**31 * NANOSECONDS
+"""First time that builtin_interfaces/Time cannot hold (in the year 2038, where time counts from 1970)."""
+
+
 def _stamped(time_ns: int, frame_id: str) -> Packer:
+    if not 0 <= time_ns < END_OF_TIME_NS:
+        raise LogError(f"{frame_id} at {time_ns} ns: a log holds times from 0 to 2^31 s; shift the run's clock")
     sec, nanosec = divmod(time_ns, NANOSECONDS)
     return Packer().put("i", sec).put("I", nanosec).text(frame_id)
 
@@ -84,13 +92,15 @@ def _number(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def _put_pose(message: Packer, pose: Pose) -> Packer:
+def _put_pose(message: Packer, pose: Pose, *, heading_known: bool = True) -> Packer:
+    if not heading_known:
+        return message.put("d", pose.x, pose.y, *[0.0] * 5)
     half = 0.5 * pose.heading
     return message.put("d", pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
 
 
 def _take_pose(cursor: Unpacker) -> tuple[Pose, bool]:
-    """The pose and whether it has a heading: an all-zero quaternion is none."""
+    """The pose and whether its heading is known."""
     x, y, _, qx, qy, qz, qw = cursor.take("d", 7)
     heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
     return Pose(x, y, heading), any((qx, qy, qz, qw))
@@ -115,8 +125,7 @@ def _take_covariance(cursor: Unpacker) -> Covariance | None:
 
 
 def _encode_ticks(value: WheelTicks) -> bytes:
-    message = _stamped(value.time_ns, value.sensor).put("I", len(value.counts))
-    return (message.put("q", *value.counts) if value.counts else message).message()
+    return _stamped(value.time_ns, value.sensor).put("I", len(value.counts)).put("q", *value.counts).message()
 
 
 def _decode_ticks(data: bytes, seq: int) -> WheelTicks:
@@ -127,8 +136,8 @@ def _decode_ticks(data: bytes, seq: int) -> WheelTicks:
 
 
 def _encode_command(value: MotorCommand) -> bytes:
-    message = _stamped(value.time_ns, value.sensor).put("I", len(value.wheel_speeds_m_s))
-    return (message.put("d", *value.wheel_speeds_m_s) if value.wheel_speeds_m_s else message).message()
+    speeds = value.wheel_speeds_m_s
+    return _stamped(value.time_ns, value.sensor).put("I", len(speeds)).put("d", *speeds).message()
 
 
 def _decode_command(data: bytes, seq: int) -> MotorCommand:
@@ -212,17 +221,17 @@ KINDS: dict[type, Kind] = {
     Ranges: Kind("/ranges", "fusion_msgs/msg/Ranges", _encode_ranges, _decode_ranges),
 }
 TRUTH = ("/ground_truth", "geometry_msgs/msg/PoseStamped")
+DECODERS = {kind.schema: kind.decode for kind in KINDS.values()}
+"""How a message of one of our types becomes a measurement again, whatever its topic."""
 PRIOR = ("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped")
 ESTIMATE_TOPIC = "/estimate/"
 FATES_TOPIC = "/fates/"
 
 
 def encode_truth(truth: Truth) -> bytes:
-    """Ground truth; an unknown heading is an all-zero quaternion."""
-    message = _stamped(truth.time_ns, MAP)
-    if truth.heading is None:
-        return message.put("d", truth.x, truth.y, *[0.0] * 5).message()
-    return _put_pose(message, Pose(truth.x, truth.y, truth.heading)).message()
+    """Ground truth."""
+    pose, known = Pose(truth.x, truth.y, truth.heading or 0.0), truth.heading is not None
+    return _put_pose(_stamped(truth.time_ns, MAP), pose, heading_known=known).message()
 
 
 def decode_truth(data: bytes) -> Truth:
@@ -233,23 +242,34 @@ def decode_truth(data: bytes) -> Truth:
     return Truth(time_ns, pose.x, pose.y, pose.heading if has_heading else None)
 
 
-def encode_prior(prior: Prior) -> bytes:
-    """The starting pose; what of it is unknown is told in the log's metadata."""
-    return _put_covariance(_put_pose(_stamped(prior.time_ns, MAP), prior.pose), prior.covariance).message()
+def encode_prior(prior: Prior) -> tuple[bytes, dict[str, str]]:
+    """The starting pose, and what goes into the log's metadata: what of it is known, and the heading to the bit."""
+    message = _put_pose(_stamped(prior.time_ns, MAP), prior.pose, heading_known=prior.heading_known)
+    about = {
+        "position_known": str(prior.position_known).lower(),
+        "heading_known": str(prior.heading_known).lower(),
+        "heading_rad": repr(float(prior.pose.heading)),
+    }
+    return _put_covariance(message, prior.covariance).message(), about
 
 
-def decode_prior(data: bytes, *, position_known: bool, heading_known: bool) -> Prior:
-    """The starting pose from its message and the log's metadata."""
+def decode_prior(data: bytes, about: Mapping[str, str]) -> Prior:
+    """The starting pose from its message and the log's metadata, which wins where it tells more."""
     cursor = Unpacker(data)
     time_ns, _ = _header(cursor)
     pose, has_heading = _take_pose(cursor)
-    covariance = _take_covariance(cursor) or Covariance.from_std(1.0, 1.0, 1.0)
-    return Prior(time_ns, pose, covariance, position_known, heading_known and has_heading)
+    covariance = _take_covariance(cursor)
+    if covariance is None:
+        raise ValueError("the prior states no covariance")
+    heading = float(about.get("heading_rad", pose.heading))
+    known = [about.get(key, "true") == "true" for key in ("position_known", "heading_known")]
+    return Prior(time_ns, pose._replace(heading=heading), covariance, known[0], known[1] and has_heading)
 
 
 def encode_estimate(estimate: Estimate) -> bytes:
     """An estimate; one without a covariance says so in its first element."""
-    return _put_covariance(_put_pose(_stamped(estimate.time_ns, MAP), estimate.pose), estimate.covariance).message()
+    message = _put_pose(_stamped(estimate.time_ns, MAP), estimate.pose, heading_known=estimate.heading_known)
+    return _put_covariance(message, estimate.covariance).message()
 
 
 def decode_estimate(data: bytes) -> Estimate:

@@ -8,14 +8,13 @@ records.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fusion import Estimate, FusionError, LogError, Measurement, Truth, World
+from fusion import Estimate, FusionError, LogError, Measurement, Prior, Truth, World
 from logs import messages
-from logs.messages import ESTIMATE_TOPIC, KINDS
+from logs.messages import DECODERS, ESTIMATE_TOPIC, FATES_TOPIC
 from logs.run import Run, TruthTrack
 from logs.writer import RUN_RECORD
 
@@ -29,31 +28,29 @@ class _Contents:
     record: dict[str, str] = field(default_factory=dict)
     measurements: list[tuple[int, Measurement]] = field(default_factory=list)
     truths: list[Truth] = field(default_factory=list)
-    prior: bytes | None = None
+    prior: Prior | None = None
     lanes: dict[str, list[Estimate]] = field(default_factory=dict)
     unreadable: dict[str, int] = field(default_factory=dict)
     foreign: dict[str, int] = field(default_factory=dict)
-    cut_off: str = ""
+    damage: str = ""
 
 
 def read_run(path: Path) -> Run:
     """The run in the log at ``path``; raises `LogError` for a file that holds none."""
     contents = _walk(path)
     world = _world(path, contents)
+    if not (contents.measurements or contents.truths or contents.lanes):
+        raise LogError(f"{path}: holds no messages, or none that can be read; record or import it again")
     contents.measurements.sort(key=lambda item: item[0])
-    prior = None
-    if contents.prior is not None:
-        known = {key: contents.record.get(key, "true") == "true" for key in ("position_known", "heading_known")}
-        prior = messages.decode_prior(contents.prior, **known)
     return Run(
         path=path,
         name=contents.record.get("name", path.stem),
         world=world,
-        prior=prior,
+        prior=contents.prior,
         metadata={key: value for key, value in contents.record.items() if key != "world"},
         measurements=tuple(measurement for _, measurement in contents.measurements),
         truth=TruthTrack.from_truths(contents.truths) if contents.truths else None,
-        warnings=_warnings(path, contents),
+        warnings=_warnings(path, contents, world),
         lanes={name: tuple(estimates) for name, estimates in contents.lanes.items()},
     )
 
@@ -79,8 +76,11 @@ def _walk(path: Path) -> _Contents:
     schemas: dict[int, str] = {}
     channels: dict[int, tuple[str, str]] = {}
     with _open(path) as stream:
+        size = path.stat().st_size
+        readable = len(MAGIC)
         try:
-            for record in StreamReader(stream, record_size_limit=None).records:
+            for record in StreamReader(stream, validate_crcs=True, record_size_limit=size).records:
+                readable = stream.tell()
                 if isinstance(record, Message):
                     _take(contents, *channels[record.channel_id], record)
                 elif isinstance(record, Schema):
@@ -89,8 +89,8 @@ def _walk(path: Path) -> _Contents:
                     channels[record.id] = (record.topic, schemas.get(record.schema_id, ""))
                 elif isinstance(record, Metadata) and record.name == RUN_RECORD:
                     contents.record.update(record.metadata)
-        except Exception as error:  # noqa: BLE001 - a damaged tail fails in any of a dozen ways, and all mean "cut off"
-            contents.cut_off = f"{type(error).__name__} after {len(contents.measurements)} measurements"
+        except Exception as error:  # noqa: BLE001 - damage shows in any of a dozen ways, and all mean "nothing further"
+            contents.damage = f"the last {size - readable} of its {size} bytes ({type(error).__name__})"
     return contents
 
 
@@ -110,28 +110,30 @@ def _open(path: Path) -> Any:  # noqa: ANN401 - a binary stream
 
 def _take(contents: _Contents, topic: str, schema: str, message: Any) -> None:  # noqa: ANN401 - an MCAP message
     """Sort one message into the contents; one that cannot be decoded is counted, not fatal."""
-    decoders: dict[str, Callable[[bytes, int], Measurement]] = {kind.schema: kind.decode for kind in KINDS.values()}
     try:
         if topic == messages.TRUTH[0]:
             contents.truths.append(messages.decode_truth(message.data))
         elif topic == messages.PRIOR[0]:
-            contents.prior = message.data
+            contents.prior = messages.decode_prior(message.data, contents.record)
         elif topic.startswith(ESTIMATE_TOPIC):
-            lane = contents.lanes.setdefault(topic.removeprefix(ESTIMATE_TOPIC), [])
-            lane.append(messages.decode_estimate(message.data))
-        elif schema in decoders:
-            contents.measurements.append((message.log_time, decoders[schema](message.data, message.sequence)))
-        else:
+            estimate = messages.decode_estimate(message.data)
+            contents.lanes.setdefault(topic.removeprefix(ESTIMATE_TOPIC), []).append(estimate)
+        elif schema in DECODERS:
+            contents.measurements.append((message.log_time, DECODERS[schema](message.data, message.sequence)))
+        elif not topic.startswith(FATES_TOPIC):
             contents.foreign[topic] = contents.foreign.get(topic, 0) + 1
     except Exception:  # noqa: BLE001 - whatever is wrong with one message, the others still count
         contents.unreadable[topic] = contents.unreadable.get(topic, 0) + 1
 
 
-def _warnings(path: Path, contents: _Contents) -> tuple[str, ...]:
+def _warnings(path: Path, contents: _Contents, world: World) -> tuple[str, ...]:
     found = []
-    if contents.cut_off:
-        found.append(f"{path}: the file is cut off ({contents.cut_off}); what was written before is used")
+    if contents.damage:
+        found.append(f"{path}: cut off or damaged, {contents.damage} cannot be read; what stands before is used")
+    if contents.record.get("world_hash", world.hash) != world.hash:
+        found.append(f"{path}: the world stored in it is not the one it was written with; its hash differs")
     found += [f"{path}: {count} messages of {topic} cannot be decoded" for topic, count in contents.unreadable.items()]
+    found += [f"{path}: {count} messages of {topic} are of no use here" for topic, count in contents.foreign.items()]
     if not contents.measurements:
         found.append(f"{path}: holds no measurements")
     return tuple(found)

@@ -1,15 +1,18 @@
 """Writes a run as one MCAP file that survives a crash with at most its last second missing.
 
 Profile `ros2`, `ros2msg` schemas and `cdr` messages only, so that every ROS 2 tool opens it. World and metadata go in
-first; a chunk is closed and handed to the operating system every second of log time, and synced to the disk at most
-once a second. The bytes depend on what is written and on nothing else.
+first; a chunk is closed and handed to the operating system every second of log time, and synced to the disk if the
+last time was about a second ago, so that nothing slows down a simulation. The bytes depend on what is written and on
+nothing else.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import IO
@@ -24,6 +27,8 @@ from logs.messages import ESTIMATE_TOPIC, FATES_TOPIC, KINDS, SCHEMAS
 RUN_RECORD = "fusion"
 """Name of the metadata record that makes an MCAP file one of ours."""
 FLUSH_NS = nanoseconds(1.0)
+SYNC_S = 0.9
+"""A little less than a second, so that a flush which comes early by a hair is synced all the same."""
 FATES = "fusion_msgs/msg/Fates"
 
 
@@ -40,6 +45,7 @@ class RunWriter:
         metadata: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         """Start a log at ``path``; raises `LogError` where it cannot be written."""
+        start, about = (b"", {}) if prior is None else messages.encode_prior(prior)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._stream: IO[bytes] = path.open("wb")
@@ -51,17 +57,15 @@ class RunWriter:
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._flushed_ns: int | None = None
-        self._synced_s = time.monotonic()
-        known = {} if prior is None else {"position_known": prior.position_known, "heading_known": prior.heading_known}
-        record = {**metadata, "name": name, "world": world.table, "world_hash": world.hash}
-        self._writer.add_metadata(RUN_RECORD, record | {key: str(value).lower() for key, value in known.items()})
+        self._synced_s = -math.inf
+        record = {**metadata, **about, "name": name, "world": world.table, "world_hash": world.hash}
+        self._writer.add_metadata(RUN_RECORD, record)
         self._writer.add_attachment(0, 0, "world.json", "application/json", world.table.encode())
         for kind in KINDS.values():
             self._channel(kind.topic, kind.schema)
         self._channel(*messages.TRUTH)
         if prior is not None:
-            self._add(*messages.PRIOR, prior.time_ns, prior.time_ns, 0, messages.encode_prior(prior))
-        self._flush()
+            self._add(*messages.PRIOR, prior.time_ns, prior.time_ns, 0, start)
 
     def write(self, measurement: Measurement, *, log_time_ns: int | None = None) -> None:
         """Append a measurement; ``log_time_ns`` says when it arrived, if not when it was true."""
@@ -95,7 +99,8 @@ class RunWriter:
         except OSError as error:
             raise LogError(f"{self._path}: could not be finished ({error}); free some space") from error
         finally:
-            self._stream.close()
+            with suppress(OSError):  # what a full disk refused above, it refuses again here
+                self._stream.close()
 
     def __enter__(self) -> RunWriter:
         return self
@@ -113,11 +118,13 @@ class RunWriter:
         return self._channels[topic]
 
     def _add(self, topic: str, schema: str, log_ns: int, stamp_ns: int, seq: int, data: bytes) -> None:
-        if log_ns < 0 or stamp_ns < 0:
-            raise LogError(f"{self._path}: {topic} at {stamp_ns} ns lies before time zero; shift the run's clock")
+        if log_ns < 0:
+            raise LogError(f"{self._path}: {topic} received at {log_ns} ns, before time zero; shift the run's clock")
+        if not 0 <= seq < 2**32:
+            raise LogError(f"{self._path}: {topic} has number {seq}; a log counts from 0 to 2^32 - 1, number it so")
         try:
-            self._writer.add_message(self._channel(topic, schema), log_ns, data, stamp_ns, seq & 0xFFFFFFFF)
-            if self._flushed_ns is None or log_ns - self._flushed_ns >= FLUSH_NS:
+            self._writer.add_message(self._channel(topic, schema), log_ns, data, stamp_ns, seq)
+            if self._flushed_ns is None or abs(log_ns - self._flushed_ns) >= FLUSH_NS:
                 self._flushed_ns = log_ns
                 self._flush()
         except OSError as error:
@@ -126,6 +133,6 @@ class RunWriter:
     def _flush(self) -> None:
         self._writer.flush()  # type: ignore[no-untyped-call]  # mcap leaves it without annotation
         self._stream.flush()
-        if time.monotonic() - self._synced_s >= 1.0:
+        if time.monotonic() - self._synced_s >= SYNC_S:
             os.fsync(self._stream.fileno())
             self._synced_s = time.monotonic()

@@ -8,6 +8,7 @@ since the paper's drawings are not published as data.
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
 from dataclasses import dataclass
 from importlib import resources
@@ -16,6 +17,9 @@ from pathlib import Path
 from fusion import World, WorldError
 from fusion.errors import did_you_mean
 from fusion.schema import check_keys, read_record
+
+STEP_S = 0.01
+"""Step of the virtual clock [s]: the periods of all sensors are whole numbers of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +57,7 @@ class Reality:
     start_std_m: float = 0.05
     start_heading_std_rad: float = 0.03
     ticks_hz: float = 20.0
+    """Rates: 0 turns the sensor off; a period is rounded to whole steps of the clock."""
     gyro_hz: float = 50.0
     wifi_hz: float = 2.0
     range_hz: float = 0.0
@@ -96,8 +101,32 @@ def _parse(name: str, text: str) -> Scenario:
     except tomllib.TOMLDecodeError as error:
         raise WorldError(f"scenario {name}: not TOML: {error}; correct that line") from error
     check_keys(table, dict.fromkeys(("world", "route", "reality")), f"scenario {name}")
-    route = read_record(Route, table.get("route", {}), f"scenario {name}: route")
-    if len(route.waypoints_m) < 2:
-        raise WorldError(f"scenario {name}: route.waypoints_m needs at least two places to drive between")
-    world = World.from_table({"name": name, **table.get("world", {})})
-    return Scenario(name, world, route, read_record(Reality, table.get("reality", {}), f"scenario {name}: reality"))
+    for part in ("world", "route"):
+        if not isinstance(table.get(part), dict):
+            raise WorldError(f"scenario {name}: it needs a table [{part}]; add it")
+    route = read_record(Route, table["route"], f"scenario {name}: route")
+    reality = read_record(Reality, table.get("reality", {}), f"scenario {name}: reality")
+    _check_route(route, f"scenario {name}: route")
+    _check_reality(reality, f"scenario {name}: reality")
+    return Scenario(name, World.from_table({"name": name, **table["world"]}), route, reality)
+
+
+def _check_route(route: Route, where: str) -> None:
+    if len(set(route.waypoints_m)) < 2:
+        raise WorldError(f"{where}.waypoints_m: give at least two different places to drive between")
+    for key in ("speed_m_s", "turn_rate_rad_s", "laps"):
+        if getattr(route, key) <= 0:
+            raise WorldError(f"{where}.{key}: {getattr(route, key)} must be greater than zero")
+    if route.pause_s < 0.0:
+        raise WorldError(f"{where}.pause_s: {route.pause_s} must not be negative; 0 drives on at once")
+
+
+def _check_reality(reality: Reality, where: str) -> None:
+    for key in (field.name for field in dataclasses.fields(reality)):
+        value = getattr(reality, key)
+        if value < 0.0 and key != "deaf_below_dbm":
+            raise WorldError(f"{where}.{key}: {value} must not be negative; 0 turns it off")
+        if key.endswith("_hz") and value * STEP_S > 1.0:
+            raise WorldError(f"{where}.{key}: {value} is faster than the virtual clock; at most {1.0 / STEP_S:g}")
+    if reality.shadowing_length_m == 0.0:
+        raise WorldError(f"{where}.shadowing_length_m: 0 must be greater than zero; for none, shadowing_std_db = 0")

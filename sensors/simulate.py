@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 
-from fusion import Truth
+from fusion import ParameterError, Truth
 from fusion.values import nanoseconds
 from sensors.scenario import builtin_names, load_scenario
 from sensors.simulated import SimulatedRobot
 
 
 def simulate(scenario: str | Path, output: Path, *, seed: int = 0, duration_s: float | None = None) -> Path:
-    """Record one run of a built-in scenario, or of a scenario file, as a log at ``output``."""
+    """Record one run of a built-in scenario, or of a scenario file, as a log at ``output``.
+
+    ``duration_s`` cuts the route short; it never makes it longer. Raises `WorldError` on a scenario that is unknown or
+    wrong, `ParameterError` on a seed or duration that means nothing, `LogError` where ``output`` cannot be written.
+    """
     from logs.writer import RunWriter
 
+    if seed < 0:
+        raise ParameterError(f"seed {seed}: must not be negative; give 0, 1, 2 ...")
+    if duration_s is not None and not (math.isfinite(duration_s) and duration_s > 0.0):
+        raise ParameterError(
+            f"duration {duration_s} s: must be a time greater than zero; leave it out for the whole route"
+        )
     loaded = load_scenario(scenario)
     robot = SimulatedRobot(loaded, seed)
     end_ns = None if duration_s is None else nanoseconds(duration_s)

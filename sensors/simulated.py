@@ -13,12 +13,14 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fusion import (
     Anchor,
     Covariance,
     Gyro,
     Measurement,
+    MotorCommand,
     Pose,
     Prior,
     RangeReading,
@@ -31,9 +33,8 @@ from fusion import (
 )
 from fusion.values import nanoseconds
 from fusion.world import DRIVES
-from sensors.scenario import Scenario
+from sensors.scenario import STEP_S, Scenario
 
-STEP_S = 0.01
 SLIP_STEPS = 50
 ARRIVED_M = 0.02
 WAVES = 48
@@ -91,7 +92,8 @@ class SimulatedRobot:
         calibration = self._stream("calibration")
         self._roll_scale = 1.0 + calibration.normal(0.0, reality.distance_scale_std)
         self._track_scale = 1.0 + calibration.normal(0.0, reality.track_scale_std)
-        self._gyro_bias = calibration.normal(0.0, reality.gyro_bias_std_rad_s)
+        told = scenario.world.robot.gyro_bias_rad_s
+        self._gyro_bias = told + calibration.normal(0.0, reality.gyro_bias_std_rad_s)
         self._radios = {
             anchor.id: _Radio(anchor, self._stream(f"radio {anchor.id}"), scenario) for anchor in scenario.world.anchors
         }
@@ -122,31 +124,44 @@ class SimulatedRobot:
                 ("truth", reality.truth_hz),
             )
         }
-        rolled = np.zeros(2)
-        slip = np.zeros(2)
+        single_channel = self.scenario.world.robot.encoder == "single_channel"
+        rolled, slip, command = np.zeros(2), np.zeros(2), (0.0, 0.0)
         for step, moment in enumerate(drive(self.scenario)):
             if step % SLIP_STEPS == 0:
                 slip = self._streams["slip"].normal(0.0, reality.slip_std, 2)
-            rolled += self._roll(moment, slip)
+            turned = self._roll(moment, slip)
+            # One channel counts edges and cannot see their direction: only the command to the motors tells it.
+            rolled += np.abs(turned) if single_channel else turned
+            if single_channel and command != (moment.speed, moment.turn_rate):
+                command = (moment.speed, moment.turn_rate)
+                yield self._command(step, moment)
             due = {name for name, period in every.items() if period and (step + 1) % period == 0}
             yield from self._messages(due, step, moment, rolled)
 
-    def _roll(
-        self, moment: Moment, slip: np.ndarray[tuple[int], np.dtype[np.float64]]
-    ) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        """How far the left and right wheels roll in one step [m]: slipping, they roll further than the robot goes."""
-        half_track = 0.5 * self.scenario.world.robot.track_width_m * self._track_scale
-        sides = np.array([moment.speed - half_track * moment.turn_rate, moment.speed + half_track * moment.turn_rate])
+    def _command(self, step: int, moment: Moment) -> MotorCommand:
+        """What the controller asks of the motors as the step begins: it knows the nominal track only."""
+        robot = self.scenario.world.robot
+        sideways = 0.5 * robot.track_width_m * moment.turn_rate
+        sides = (moment.speed - sideways, moment.speed + sideways)
+        return MotorCommand(moment.time_ns - nanoseconds(STEP_S), "motors", step, sides * (DRIVES[robot.drive] // 2))
+
+    def _roll(self, moment: Moment, slip: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far the left and right wheels roll in one step [m], (2,); slipping, further than the robot goes."""
+        robot = self.scenario.world.robot
+        # The distance scale that the world tells corrects the path alone; its track width is the effective one already.
+        ahead = moment.speed / robot.distance_scale
+        sideways = 0.5 * robot.track_width_m * self._track_scale * moment.turn_rate
+        sides = np.array([ahead - sideways, ahead + sideways])
         return sides * STEP_S * self._roll_scale * (1.0 + slip)
 
     def _messages(
-        self, due: set[str], step: int, moment: Moment, rolled: np.ndarray[tuple[int], np.dtype[np.float64]]
+        self, due: set[str], step: int, moment: Moment, rolled: NDArray[np.float64]
     ) -> Iterator[Measurement | Truth]:
         robot, time_ns, pose = self.scenario.world.robot, moment.time_ns, moment.pose
         if "gyro" in due:
             noise = self._streams["gyro"].normal(0.0, self.scenario.reality.gyro_noise_std_rad_s)
             yield Gyro(time_ns, "gyro", step, moment.turn_rate + self._gyro_bias + float(noise))
-        if "ticks" in due:
+        if "ticks" in due and DRIVES[robot.drive]:
             left, right = (math.floor(side / robot.distance_per_tick_m) for side in rolled)
             yield WheelTicks(time_ns, "encoders", step, (left, right) * (DRIVES[robot.drive] // 2))
         if "wifi" in due:

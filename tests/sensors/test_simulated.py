@@ -1,18 +1,34 @@
 """The simulated robot sends what a real one would, and the same for the same seed."""
 
+import itertools
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from fusion import Increment, Odometry, Truth, WheelTicks, WifiScan, WorldError
+from fusion import (
+    Gyro,
+    Increment,
+    LogError,
+    MotorCommand,
+    Odometry,
+    ParameterError,
+    Pose,
+    Ranges,
+    Truth,
+    WheelTicks,
+    WifiScan,
+    WorldError,
+)
 from fusion.odometry import Odometer
+from logs.reader import read_run
 from sensors.scenario import builtin_names, load_scenario
 from sensors.simulate import simulate
 from sensors.simulated import SimulatedRobot, drive
 
-IDEAL = dict.fromkeys(
-    (
+NO_ERRORS = dict.fromkeys(
+    [
         "anchor_offset_std_db",
         "shadowing_std_db",
         "fading_std_db",
@@ -24,15 +40,61 @@ IDEAL = dict.fromkeys(
         "gyro_noise_std_rad_s",
         "start_std_m",
         "start_heading_std_rad",
-    ),
+    ],
     0.0,
 )
+FINE = 1_000_000
+"""Ticks a revolution at which rounding to whole ticks no longer matters."""
+SCENARIO = """
+[world]
+bounds = {x_min = -1.0, x_max = 9.0, y_min = -1.0, y_max = 9.0}
+[route]
+waypoints_m = [[0.0, 0.0], [2.0, 0.0]]
+"""
 
 
-def ideal():
-    """The office without any error but the rounding of ticks and of dBm."""
-    scenario = load_scenario("office")
-    return replace(scenario, reality=replace(scenario.reality, **IDEAL))
+def with_robot(scenario, **changes):
+    return replace(scenario, world=replace(scenario.world, robot=replace(scenario.world.robot, **changes)))
+
+
+def with_reality(scenario, **changes):
+    return replace(scenario, reality=replace(scenario.reality, **changes))
+
+
+def ideal(name="office", **robot):
+    """One lap of a built-in scenario without any error but the rounding of ticks and of dBm."""
+    scenario = with_robot(with_reality(load_scenario(name), **NO_ERRORS), **robot)
+    return replace(scenario, route=replace(scenario.route, laps=1))
+
+
+def dead_reckoned(scenario, seed=0):
+    """Distance from the truth [m] at every truth of a run, from the true start on odometry alone."""
+    odometer, motion, errors = Odometer(scenario.world.robot), Increment(), []
+    state = odometer.start(0)
+    start = Pose(*scenario.route.waypoints_m[0], next(drive(scenario)).pose.heading)
+    for message in SimulatedRobot(scenario, seed).run():
+        if isinstance(message, Truth):
+            place = start.compose(motion.pose)
+            errors.append(math.dist((place.x, place.y), (message.x, message.y)))
+            continue
+        state, seen = odometer.advance(state, message)
+        for odometry in seen:
+            if isinstance(odometry, Odometry):
+                motion = motion.extend(odometry, scenario.world.robot.noise)
+    return np.array(errors)
+
+
+def said_by(scenario, kind, seed=0):
+    return [message for message in SimulatedRobot(scenario, seed).run() if isinstance(message, kind)]
+
+
+def crosses(a, b, c, d):
+    """Whether the segments a-b and c-d touch, by solving for the point where they meet."""
+    directions = np.array([np.subtract(b, a), np.subtract(c, d)]).T
+    if abs(np.linalg.det(directions)) < 1e-12:
+        return False
+    along = np.linalg.solve(directions, np.subtract(c, a))
+    return bool(np.all(along >= 0.0) and np.all(along <= 1.0))
 
 
 def test_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path):
@@ -44,48 +106,215 @@ def test_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path):
     assert first != other
 
 
+def test_log_says_what_the_robot_said(tmp_path):
+    scenario = load_scenario("mec")
+    run = read_run(simulate("mec", tmp_path / "mec.mcap", seed=4, duration_s=10.0))
+    said = [message for message in SimulatedRobot(scenario, 4).run() if message.time_ns <= 10_000_000_000]
+    assert run.measurements == tuple(message for message in said if not isinstance(message, Truth))
+    assert len(run.truth) == sum(isinstance(message, Truth) for message in said)
+    assert run.world == scenario.world
+    assert run.measurements[-1].time_ns <= 10_000_000_000
+
+
+def test_builtin_scenarios_are_the_three_of_the_paper_at_its_exponents_and_band():
+    assert builtin_names() == ("arena", "mec", "office")
+    for name, exponent in (("office", 2.27), ("mec", 2.13), ("arena", 1.71)):
+        anchors = load_scenario(name).world.anchors
+        assert len(anchors) == 3
+        assert {anchor.radio.path_loss_exponent for anchor in anchors} == {exponent}
+        assert all(2.4e9 < anchor.radio.frequency_hz < 2.5e9 for anchor in anchors)
+
+
 @pytest.mark.parametrize("name", ["office", "mec", "arena"])
-def test_builtin_route_stays_inside_its_bounds(name):
+def test_builtin_route_stays_on_the_floor_and_goes_through_no_wall(name):
     scenario = load_scenario(name)
-    bounds = scenario.world.bounds
-    assert name in builtin_names()
-    for moment in drive(scenario):
-        assert bounds.x_min < moment.pose.x < bounds.x_max
-        assert bounds.y_min < moment.pose.y < bounds.y_max
+    bounds, walls = scenario.world.bounds, scenario.world.walls
+    assert all(
+        bounds.x_min < moment.pose.x < bounds.x_max and bounds.y_min < moment.pose.y < bounds.y_max
+        for moment in drive(scenario)
+    )
+    legs = itertools.pairwise(scenario.route.waypoints_m)
+    sides = [side for wall in walls for side in itertools.pairwise(wall)]
+    assert not [(leg, side) for leg in legs for side in sides if crosses(*leg, *side)]
 
 
-def test_ticks_of_an_ideal_robot_integrate_to_the_true_path():
-    """A tick is 1.02 cm on a track of 15 cm, so headings are rounded to 4 degrees at any time, but never drift."""
-    scenario = ideal()
-    robot = SimulatedRobot(scenario)
-    odometer = Odometer(scenario.world.robot)
-    state, motion, truth = odometer.start(0), Increment(), None
-    for message in robot.run():
-        if isinstance(message, WheelTicks):
-            state, seen = odometer.advance(state, message)
-            for odometry in seen:
-                assert isinstance(odometry, Odometry)
-                motion = motion.extend(odometry, scenario.world.robot.noise)
-        elif isinstance(message, Truth):
-            truth = message
-    start = next(drive(scenario)).pose
-    start = start._replace(x=scenario.route.waypoints_m[0][0], y=scenario.route.waypoints_m[0][1])
-    assert math.dist(start.compose(motion.pose)[:2], (truth.x, truth.y)) < 1.5
+@pytest.mark.parametrize("name", ["office", "mec", "arena"])
+def test_robot_ends_on_its_last_way_point(name):
+    scenario = load_scenario(name)
+    *_, last = drive(scenario)
+    assert math.dist((last.pose.x, last.pose.y), scenario.route.waypoints_m[-1]) < 0.02
+
+
+@pytest.mark.parametrize("turn_source", ["wheels", "gyro"])
+@pytest.mark.parametrize("distance_scale", [1.0, 1.03])
+def test_odometry_of_a_perfect_robot_is_exact(turn_source, distance_scale):
+    """What is left is the motion before the first message and the order of turning and driving inside one, 50 ms."""
+    scenario = ideal(ticks_per_revolution=FINE, turn_source=turn_source, distance_scale=distance_scale)
+    assert dead_reckoned(with_reality(scenario, gyro_hz=100.0)).max() < 0.05
+
+
+def test_ticks_of_the_papers_robot_do_not_drift():
+    """One tick, 1.02 cm on a track of 15 cm, is 4 degrees; but the counts are cumulative, and driving on averages it."""
+    coarse, fine = dead_reckoned(ideal()).max(), dead_reckoned(ideal(ticks_per_revolution=FINE)).max()
+    assert fine < coarse < 0.1
+
+
+def test_slip_and_wheel_errors_lead_dead_reckoning_astray():
+    honest = load_scenario("office")
+    for seed in range(2):
+        assert 0.3 < dead_reckoned(honest, seed).max() < 12.0
+
+
+def test_single_channel_encoder_counts_up_only_and_motor_commands_tell_its_direction():
+    quadrature = ideal(ticks_per_revolution=FINE)
+    scenario = ideal(ticks_per_revolution=FINE, encoder="single_channel")
+    counts = np.array([ticks.counts for ticks in said_by(scenario, WheelTicks)])
+    assert np.all(np.diff(counts, axis=0) >= 0)
+    assert np.any(np.diff([ticks.counts for ticks in said_by(quadrature, WheelTicks)], axis=0) < 0)
+    assert not said_by(quadrature, MotorCommand)
+    assert dead_reckoned(scenario).max() < 1.0
+
+
+@pytest.mark.parametrize(("kind", "wheels"), [("differential", 2), ("skid_steer", 4)])
+def test_every_wheel_has_its_count(kind, wheels):
+    assert {len(ticks.counts) for ticks in said_by(ideal(drive=kind), WheelTicks)} == {wheels}
+
+
+def test_robot_without_wheels_sends_no_ticks():
+    assert not said_by(ideal(drive="none"), WheelTicks)
 
 
 def test_signal_of_an_ideal_radio_is_the_path_loss_model_in_whole_decibels():
     scenario = ideal()
-    messages = list(SimulatedRobot(scenario).run())
-    truths = {message.time_ns: message for message in messages if isinstance(message, Truth)}
-    scans = [message for message in messages if isinstance(message, WifiScan)]
-    assert len(scans) > 100
-    for scan in scans:
+    truths = {truth.time_ns: truth for truth in said_by(scenario, Truth)}
+    away, heard = [], []
+    for scan in said_by(scenario, WifiScan):
+        truth = truths[scan.time_ns]
         for reading in scan.readings:
-            pose, anchor = truths[scan.time_ns], scenario.world.anchor(reading.anchor)
-            away = math.dist((pose.x, pose.y, 0.2), (anchor.x, anchor.y, anchor.z))
-            assert abs(reading.rssi_dbm - float(anchor.radio.expected(away))) <= 0.5 + 1e-9
+            anchor = scenario.world.anchor(reading.anchor)
+            away.append(
+                math.dist((truth.x, truth.y, scenario.world.robot.antenna_m[2]), (anchor.x, anchor.y, anchor.z))
+            )
+            heard.append(reading.rssi_dbm)
+            assert abs(reading.rssi_dbm - float(anchor.radio.expected(away[-1]))) <= 0.5 + 1e-9
+    per_decade = np.polyfit(np.log10(away), heard, 1)[0]
+    assert per_decade == pytest.approx(-22.7, abs=0.3)
+    assert all(value == round(value) for value in heard)
 
 
-def test_unknown_scenario_is_answered_with_the_nearest():
+def test_a_wall_between_takes_the_loss_it_is_said_to_take():
+    clear, walled = ideal(), with_reality(ideal(), wall_loss_db=7.0)
+    drops = {
+        without.rssi_dbm - through.rssi_dbm
+        for before, after in zip(said_by(clear, WifiScan), said_by(walled, WifiScan), strict=True)
+        for without, through in zip(before.readings, after.readings, strict=True)
+    }
+    assert {0.0, 7.0} <= drops
+    assert all(drop % 7.0 == 0.0 for drop in drops)
+
+
+def test_shadowing_belongs_to_the_place_and_has_the_spread_it_is_said_to_have():
+    """Alike within a step of the robot, unlike across the floor; over many draws of the field 3 dB."""
+    scenario = with_reality(ideal(), shadowing_std_db=3.0)
+    deviations = []
+    for seed in range(6):
+        pairs = zip(said_by(scenario, WifiScan, seed), said_by(ideal(), WifiScan), strict=True)
+        deviations += [
+            [r.rssi_dbm - m.rssi_dbm for r, m in zip(real.readings, model.readings, strict=True)]
+            for real, model in pairs
+        ]
+    values = np.array(deviations)
+    assert values.std() == pytest.approx(3.0, rel=0.25)
+    assert np.abs(np.diff(values, axis=0)).mean() < 0.5 * values.std()
+
+
+def test_signals_too_weak_are_not_heard():
+    heard = said_by(with_reality(ideal(), deaf_below_dbm=-40.0), WifiScan)
+    assert all(reading.rssi_dbm >= -40.0 for scan in heard for reading in scan.readings)
+    assert len({len(scan.readings) for scan in heard}) > 1
+
+
+def test_switching_a_sensor_on_leaves_the_noise_of_the_others_as_it_was():
+    scenario = load_scenario("arena")
+    others = Gyro | WheelTicks | WifiScan | Truth
+    ranging = with_reality(scenario, range_hz=5.0)
+    assert said_by(scenario, others) == said_by(ranging, others)
+    assert said_by(ranging, Ranges)
+    quiet = with_reality(scenario, gyro_hz=0.0)
+    assert said_by(scenario, WheelTicks | WifiScan) == said_by(quiet, WheelTicks | WifiScan)
+
+
+def test_gyro_reads_the_turn_rate_plus_the_bias_the_world_tells():
+    scenario = ideal(gyro_bias_rad_s=0.02)
+    standing = [moment.time_ns for moment in drive(scenario) if moment.turn_rate == 0.0]
+    rates = {gyro.time_ns: gyro.rate_rad_s for gyro in said_by(scenario, Gyro)}
+    assert {rates[time_ns] for time_ns in standing if time_ns in rates} == {0.02}
+
+
+def test_prior_is_off_by_what_its_covariance_says():
+    scenario = load_scenario("office")
+    start = Pose(*scenario.route.waypoints_m[0], next(drive(scenario)).pose.heading)
+    priors = [SimulatedRobot(scenario, seed).prior() for seed in range(200)]
+    off = np.array([np.subtract(prior.pose, start) for prior in priors])
+    stds = np.sqrt([priors[0].covariance.xx, priors[0].covariance.yy, priors[0].covariance.hh])
+    assert np.mean((off / stds) ** 2) == pytest.approx(1.0, abs=0.25)
+
+
+@pytest.mark.parametrize("name", ["offce", "ofice", "Office"])
+def test_unknown_scenario_is_answered_with_the_nearest(name):
     with pytest.raises(WorldError, match="did you mean 'office'"):
-        load_scenario("offce")
+        load_scenario(name)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("speed_m_s = 0.0", "speed_m_s: 0.0 must be greater than zero"),
+        ("turn_rate_rad_s = -1.0", "turn_rate_rad_s: -1.0 must be greater than zero"),
+        ("laps = 0", "laps: 0 must be greater than zero"),
+        ("pause_s = -1.0", "pause_s: -1.0 must not be negative"),
+        ("sped_m_s = 0.5", "did you mean 'speed_m_s'"),
+        ("[reality]\ngyro_hz = 250.0", "gyro_hz: 250.0 is faster than the virtual clock"),
+        ("[reality]\nslip_std = -0.1", "slip_std: -0.1 must not be negative"),
+        ("[reality]\nshadowing_length_m = 0.0", "shadowing_length_m"),
+        ("[reality]\nwall_loss = 3.0", "did you mean 'wall_loss_db'"),
+        ("[truth]\nwall_loss_db = 3.0", "unknown key 'truth'"),
+        ("speed_m_s = fast", "not TOML"),
+    ],
+)
+def test_wrong_scenario_is_refused_and_says_where(tmp_path, line, message):
+    path = tmp_path / "mine.toml"
+    path.write_text(SCENARIO + line, encoding="utf-8")
+    with pytest.raises(WorldError, match=message) as refusal:
+        load_scenario(path)
+    assert "mine" in str(refusal.value)
+
+
+@pytest.mark.parametrize("places", ["[]", "[[1.0, 2.0]]", "[[1.0, 2.0], [1.0, 2.0]]"])
+def test_route_that_goes_nowhere_is_refused(tmp_path, places):
+    path = tmp_path / "mine.toml"
+    path.write_text(SCENARIO.replace("[[0.0, 0.0], [2.0, 0.0]]", places), encoding="utf-8")
+    with pytest.raises(WorldError, match="two different places"):
+        load_scenario(path)
+
+
+def test_scenario_of_ones_own_is_driven_from_its_file(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(SCENARIO, encoding="utf-8")
+    run = read_run(simulate(path, tmp_path / "mine.mcap"))
+    assert run.world.name == "mine"
+    assert math.dist((run.truth.x[-1], run.truth.y[-1]), (2.0, 0.0)) < 0.02
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"seed": -1}, {"duration_s": math.nan}, {"duration_s": math.inf}, {"duration_s": 0.0}]
+)
+def test_seed_or_duration_without_a_meaning_is_refused_before_anything_is_written(tmp_path, wrong):
+    with pytest.raises(ParameterError):
+        simulate("office", tmp_path / "run.mcap", **wrong)
+    assert not list(tmp_path.iterdir())
+
+
+def test_output_that_cannot_be_written_is_told(tmp_path):
+    with pytest.raises(LogError, match="cannot be written"):
+        simulate("office", tmp_path, duration_s=1.0)

@@ -1,0 +1,388 @@
+"""The kit is held against one correct estimator and against small changes of it, each of which it must notice."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import fusion
+from fusion import (
+    ConformanceError,
+    Covariance,
+    Decision,
+    Estimate,
+    Fate,
+    Increment,
+    Odometry,
+    ParameterError,
+    PluginError,
+    Pose,
+    Ranges,
+    Reason,
+    Tag,
+    WifiScan,
+    compose,
+    registered,
+    sightings,
+    wrap_angle,
+)
+from fusion.belief import HEADING_KNOWN_STD, starting_belief
+from fusion.check import run as run_check
+from fusion.conformance import Outcome, checks, run_checks
+from fusion.promises import PROMISES
+from fusion.screen import unusable
+
+
+class State(NamedTuple):
+    time_ns: int
+    seed: int
+    pose: Pose
+    covariance: Covariance
+
+
+class Correct:
+    """A gated extended Kalman filter over the pose, composed at every odometry step."""
+
+    summary = "reference"
+    tags = frozenset()
+    gate = 10.8
+
+    def __init__(self, world):
+        self.world = world
+
+    def start(self, prior, seed):
+        return State(prior.time_ns, seed, *starting_belief(self.world, prior))
+
+    def step(self, state, measurement):
+        if isinstance(measurement, Odometry):
+            return self.move(state, measurement), ()
+        if isinstance(measurement, WifiScan | Ranges):
+            return self.see(state, measurement)
+        return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+
+    def move(self, state, odometry):
+        motion = Increment().extend(odometry, self.world.robot.noise)
+        pose, covariance = compose(state.pose, state.covariance, motion)
+        return state._replace(time_ns=odometry.time_ns, pose=pose, covariance=covariance)
+
+    def see(self, state, scan):
+        mean, p = np.array(state.pose), np.array(state.covariance.matrix)
+        before, p_before, fates = mean, p, []
+        for sighting in sightings(self.world, scan):
+            expected = sighting.expect(*before, self.world.robot.antenna_m)
+            row = np.array([expected.by_x, expected.by_y, expected.by_heading])
+            variance = sighting.variance + sighting.model.bias_std**2
+            innovation, spread = sighting.value - expected.value, float(row @ p_before @ row) + variance
+            nis = innovation**2 / spread
+            used = nis <= self.gate
+            if used:
+                gain = p @ row / (row @ p @ row + variance)
+                mean = mean + gain * (innovation - row @ (mean - before))
+                p = p - np.outer(gain, row @ p)
+            verdict = (Decision.USED, Reason.OK, 1.0) if used else (Decision.REJECTED, Reason.GATE, 0.0)
+            who = (scan.time_ns, scan.sensor, scan.seq, sighting.anchor.id)
+            fates.append(Fate(*who, *verdict, innovation, spread, nis))
+        x, y, heading = mean.tolist()
+        spread = Covariance(p[0, 0], p[0, 1], p[0, 2], p[1, 1], p[1, 2], p[2, 2])
+        return State(scan.time_ns, state.seed, Pose(x, y, wrap_angle(heading)), spread), tuple(fates)
+
+    def estimate(self, state, time_ns):
+        known = state.covariance.hh < HEADING_KNOWN_STD**2
+        return Estimate(time_ns, state.pose, state.covariance, heading_known=known)
+
+
+class GlobalDice(Correct):
+    def move(self, state, odometry):
+        moved = super().move(state, odometry)
+        jitter = np.random.random() * 1e-9  # noqa: NPY002 - that is the fault
+        return moved._replace(pose=moved.pose._replace(x=moved.pose.x + jitter))
+
+
+class SecretSeed(Correct):
+    def start(self, prior, seed):
+        first = super().start(prior, seed)
+        return first._replace(pose=first.pose._replace(x=first.pose.x + 1e-3 * seed))
+
+
+class CountsInItself(Correct):
+    steps = 0
+
+    def move(self, state, odometry):
+        self.steps += 1
+        moved = super().move(state, odometry)
+        return moved._replace(pose=moved.pose._replace(x=moved.pose.x + 1e-9 * self.steps))
+
+
+class WritesIntoState(Correct):
+    """Keeps its pose in an array and adds to it in place."""
+
+    def start(self, prior, seed):
+        return np.array(prior.pose)
+
+    def step(self, state, measurement):
+        if isinstance(measurement, Odometry):
+            state[0] += measurement.distance_m
+        return state, ()
+
+    def estimate(self, state, time_ns):
+        return Estimate(time_ns, Pose(*state.tolist()), Covariance.from_std(1.0, 1.0, 0.1))
+
+
+class EstimateAdvances(Correct):
+    shift = 0.0
+
+    def estimate(self, state, time_ns):
+        self.shift += 1e-9
+        found = super().estimate(state, time_ns)
+        return found._replace(pose=found.pose._replace(x=found.pose.x + self.shift))
+
+
+class Unpicklable(Correct):
+    def start(self, prior, seed):
+        return super().start(prior, lambda: seed)
+
+
+class SurerLater(Correct):
+    def estimate(self, state, time_ns):
+        found = super().estimate(state, time_ns)
+        shrunk = 0.9 if time_ns > state.time_ns else 1.0
+        return found._replace(covariance=Covariance(*(shrunk * number for number in found.covariance)))
+
+
+class SilentAnchor(Correct):
+    def see(self, state, scan):
+        after, fates = super().see(state, scan)
+        return after, fates[1:]
+
+
+class HeavyWeight(Correct):
+    def see(self, state, scan):
+        after, fates = super().see(state, scan)
+        return after, tuple(fate._replace(weight=1.7) for fate in fates)
+
+
+class NisWithoutSquare(Correct):
+    def see(self, state, scan):
+        after, fates = super().see(state, scan)
+        return after, tuple(fate._replace(nis=abs(fate.innovation) / fate.innovation_variance) for fate in fates)
+
+
+class LostBeyondDoubt(Correct):
+    def estimate(self, state, time_ns):
+        return super().estimate(state, time_ns)._replace(p_lost=1.5)
+
+
+class NegativeVariance(Correct):
+    def estimate(self, state, time_ns):
+        found = super().estimate(state, time_ns)
+        return found._replace(covariance=found.covariance._replace(yy=-0.01))
+
+
+class InventedCovariance(Correct):
+    tags = frozenset({Tag.NO_COVARIANCE})
+
+
+class UnwrappedHeading(Correct):
+    def estimate(self, state, time_ns):
+        found = super().estimate(state, time_ns)
+        return found._replace(pose=found.pose._replace(heading=found.pose.heading + math.tau))
+
+
+class NeedsWifi(Correct):
+    """Gives up without Wi-Fi: after a while its pose is not a number."""
+
+    def start(self, prior, seed):
+        return super().start(prior, prior.time_ns)
+
+    def see(self, state, scan):
+        heard = state.seed if isinstance(scan, Ranges) else scan.time_ns
+        after, fates = super().see(state, scan)
+        return after._replace(seed=heard), fates
+
+    def estimate(self, state, time_ns):
+        found = super().estimate(state, time_ns)
+        silent = time_ns - state.seed > 5_000_000_000
+        return found._replace(pose=Pose(math.nan, 0.0, 0.0)) if silent else found
+
+
+class AveragesHeadings(Correct):
+    """Smooths its heading as if it were a length."""
+
+    def move(self, state, odometry):
+        moved = super().move(state, odometry)
+        heading = 0.5 * state.pose.heading + 0.5 * moved.pose.heading + 0.5 * odometry.turn_rad
+        return moved._replace(pose=moved.pose._replace(heading=heading))
+
+
+class RemembersTheNewest(Correct):
+    """Never lets its time run back, not even when the host goes back to an older state."""
+
+    newest_ns = 0
+
+    def move(self, state, odometry):
+        late, self.newest_ns = odometry.time_ns < self.newest_ns, max(self.newest_ns, odometry.time_ns)
+        return state if late else super().move(state, odometry)
+
+
+class HardCodedRoom(Correct):
+    def see(self, state, scan):
+        after, fates = super().see(state, scan)
+        return after._replace(pose=after.pose._replace(x=min(max(after.pose.x, 0.0), 10.0))), fates
+
+
+class OrderOfNames(Correct):
+    """Believes the first anchor twice."""
+
+    def see(self, state, scan):
+        first = type(scan)(scan.time_ns, scan.sensor, scan.seq, scan.readings[:1])
+        return super().see(super().see(state, first)[0], scan)
+
+
+class NoGate(Correct):
+    gate = math.inf
+
+
+class Backwards(Correct):
+    def move(self, state, odometry):
+        noise = self.world.robot.noise
+        motion = Increment().extend(odometry, noise)
+        pose, covariance = compose(state.pose, state.covariance, motion._replace(x=-motion.x, y=-motion.y))
+        return state._replace(time_ns=odometry.time_ns, pose=pose, covariance=covariance)
+
+
+class ConstantCovariance(Correct):
+    def estimate(self, state, time_ns):
+        return super().estimate(state, time_ns)._replace(covariance=Covariance.from_std(0.3, 0.3, 0.1))
+
+
+class NoisePerMessage(Correct):
+    def move(self, state, odometry):
+        moved = super().move(state, odometry)
+        p = moved.covariance
+        return moved._replace(covariance=p._replace(xx=p.xx + 1e-3, yy=p.yy + 1e-3, hh=p.hh + 1e-3))
+
+
+class SureOfItsHeading(Correct):
+    def estimate(self, state, time_ns):
+        return super().estimate(state, time_ns)._replace(heading_known=True)
+
+
+class StartsNowhere(Correct):
+    """Claims to start anywhere, and takes the prior's position at its word."""
+
+    tags = frozenset({Tag.GLOBAL_START})
+    gate = 0.5
+
+    def start(self, prior, seed):
+        return State(prior.time_ns, seed, prior.pose, prior.covariance)
+
+
+class TooFar(Correct):
+    def estimate(self, state, time_ns):
+        found = super().estimate(state, time_ns)
+        return found._replace(pose=found.pose._replace(x=found.pose.x + 0.6))
+
+
+BROKEN = {
+    GlobalDice: "same-bytes",
+    SecretSeed: "no-hidden-dice",
+    CountsInItself: "step-is-pure",
+    WritesIntoState: "state-is-kept",
+    EstimateAdvances: "estimate-is-pure",
+    Unpicklable: "state-pickles",
+    SurerLater: "later-not-surer",
+    SilentAnchor: "every-fate",
+    HeavyWeight: "fate-numbers",
+    NisWithoutSquare: "fate-numbers",
+    LostBeyondDoubt: "honest-form",
+    NegativeVariance: "covariance",
+    InventedCovariance: "covariance",
+    UnwrappedHeading: "heading-range",
+    NeedsWifi: "any-sensor-out",
+    AveragesHeadings: "no-jump-at-pi",
+    RemembersTheNewest: "order-of-arrival",
+    TooFar: "small-error",
+    HardCodedRoom: "world-turns",
+    OrderOfNames: "names-mean-nothing",
+    NoGate: "outlier-is-bounded",
+    Backwards: "forward-is-forward",
+    ConstantCovariance: "silence-is-told",
+    NoisePerMessage: "rate-means-nothing",
+    SureOfItsHeading: "unknown-heading",
+    StartsNowhere: "global-start",
+}
+
+
+@pytest.mark.parametrize("check", list(checks(Correct)), ids=lambda check: check.id)
+def test_correct_estimator_keeps_every_promise(check):
+    check.run()
+
+
+@pytest.mark.parametrize(("broken", "promise_id"), BROKEN.items(), ids=lambda value: getattr(value, "__name__", value))
+def test_broken_estimator_fails_its_named_check(broken, promise_id):
+    (check,) = (check for check in checks(broken) if check.id == promise_id)
+    with pytest.raises(AttributeError if broken is Unpicklable else ConformanceError):
+        check.run()
+
+
+def test_every_promise_has_an_estimator_that_breaks_it():
+    assert {promise.id for promise in PROMISES} == set(BROKEN.values())
+
+
+def test_ids_are_unique_and_every_promise_says_why():
+    assert len({promise.id for promise in PROMISES}) == len(PROMISES)
+    assert all(promise.reason.endswith(".") for promise in PROMISES)
+
+
+def test_verdicts_tell_broken_excused_and_skipped_apart():
+    with registered("no_gate", NoGate), registered("radio_less", type("Quiet", (Correct,), {"tags": {Tag.NO_RADIO}})):
+        by_id = {verdict.id: verdict for verdict in run_checks("no_gate")}
+        excused = {v.id: v for v in run_checks("no_gate", {"outlier-is-bounded": "it has no gate"})}
+        skipped = {v.id: v for v in run_checks("radio_less")}
+    assert by_id["outlier-is-bounded"].outcome is Outcome.BROKEN
+    assert "moves the pose" in by_id["outlier-is-bounded"].detail
+    assert excused["outlier-is-bounded"].outcome is Outcome.EXCUSED
+    assert skipped["outlier-is-bounded"].outcome is Outcome.SKIPPED
+    assert "no_radio" in skipped["outlier-is-bounded"].detail
+
+
+def test_excuse_that_is_not_needed_counts_as_broken():
+    with registered("correct", Correct):
+        by_id = {verdict.id: verdict for verdict in run_checks("correct", {"same-bytes": "for no reason"})}
+    assert by_id["same-bytes"].outcome is Outcome.BROKEN
+    assert "take away the excuse" in by_id["same-bytes"].detail
+
+
+def test_unknown_promise_and_unknown_estimator_are_answered_with_a_hint():
+    with pytest.raises(ParameterError, match="did you mean 'same-bytes'"):
+        run_checks("ekf", {"same-byte": "?"})
+    with pytest.raises(PluginError, match=r"did you mean|known"):
+        run_checks("no_such_filter")
+
+
+def test_estimator_that_raises_is_a_verdict_not_a_traceback():
+    class Raises(Correct):
+        def see(self, state, scan):
+            raise ZeroDivisionError("a fault of its own")
+
+    with registered("raises", Raises):
+        broken = [verdict for verdict in run_checks("raises") if verdict.outcome is Outcome.BROKEN]
+    assert broken
+    assert all("a fault of its own" in verdict.detail for verdict in broken)
+
+
+@pytest.mark.parametrize(("estimator", "code"), [(Correct, 0), (HeavyWeight, 1)])
+def test_verb_tells_a_line_for_each_promise_and_exits_by_the_result(estimator, code, capsys):
+    import argparse
+    import json
+
+    with registered("held", estimator):
+        assert run_check(argparse.Namespace(name="held", json=False)) == code
+        text = capsys.readouterr().out
+        assert run_check(argparse.Namespace(name="held", json=True)) == code
+        rows = json.loads(capsys.readouterr().out)
+    assert all(promise.id in text for promise in PROMISES)
+    assert [row["id"] for row in rows] == [promise.id for promise in PROMISES]
+    assert ("broken" in {row["outcome"] for row in rows}) == bool(code)
+    assert fusion.names() == tuple(name for name in fusion.names() if name != "held")

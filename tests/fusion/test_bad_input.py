@@ -1,0 +1,70 @@
+"""What is malformed is refused with one sentence, never with a traceback and never with a wild answer."""
+
+import pytest
+
+from fusion import (
+    MeasurementError,
+    MotorCommand,
+    Odometry,
+    RangeReading,
+    Ranges,
+    Reason,
+    WheelTicks,
+    World,
+    WorldError,
+    build,
+    track,
+)
+from fusion.drive import Drive
+
+ANCHORS = [{"id": "a", "position_m": [0, 0]}, {"id": "b", "position_m": [5, 0]}, {"id": "c", "position_m": [0, 5]}]
+BOUNDS = "[bounds]\nx_min = 0\nx_max = 1\ny_min = 0\ny_max = 1\n"
+
+
+def fold(*measurements, robot=None):
+    world = World.from_table({"anchors": ANCHORS, "robot": robot or {}})
+    return list(track(build("dead_reckoning", world), world, measurements, Drive().prior()))
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"anchors": ANCHORS, "radio": 3}, "radio: expected a table"),
+        ({"anchors": [ANCHORS[0] | {"ranging": 3}]}, r"anchors\[0\].ranging: expected a table"),
+        ({"anchors": ANCHORS, "radio": {"shadowing_std_db": 10**400}}, "is not a finite number"),
+    ],
+)
+def test_table_of_the_wrong_shape_is_named(table, message):
+    with pytest.raises(WorldError, match=message):
+        World.from_table(table)
+
+
+@pytest.mark.parametrize(
+    "text", [f"provenance = 1979-05-27\n{BOUNDS}", f"{BOUNDS}[radio]\nfrequency_hz = 1979-05-27\n"]
+)
+def test_date_in_a_world_file_is_refused(text):
+    with pytest.raises(WorldError, match="expected"):
+        World.from_toml(text)
+
+
+@pytest.mark.parametrize(
+    "wrong", [WheelTicks(1, "wheels", 1, (1,)), WheelTicks(1, "wheels", 1, ()), MotorCommand(1, "motors", 1, (0.1,))]
+)
+def test_wrong_number_of_wheels_is_told_with_both_numbers(wrong):
+    with pytest.raises(MeasurementError, match=r"tells of \d wheels, the world's skid_steer drive has 4"):
+        fold(wrong)
+
+
+def test_odometry_that_ends_before_it_begins_is_refused_and_moves_nothing():
+    backwards = Odometry(10**9, "wheels", 1, 2 * 10**9, 1.0, 0.0)
+    updates = fold(backwards, Ranges(11 * 10**8, "uwb", 1, (RangeReading("a", 1.0),)))
+    assert [fate.reason for fate in updates[0].fates] == [Reason.BAD_CLOCK]
+    assert updates[-1].estimate.pose == Drive().pose(0)
+
+
+def test_encoder_that_starts_over_loses_one_message_and_no_more():
+    robot = {"drive": "differential", "ticks_per_revolution": 100, "wheel_circumference_m": 1.0}
+    counts = [1000, 1010, 0, 10, 20]
+    ticks = [WheelTicks((i + 1) * 10**8, "wheels", i, (count, count)) for i, count in enumerate(counts)]
+    driven = fold(*ticks, robot=robot)[-1].estimate.pose.x - Drive().pose(0).x
+    assert driven == pytest.approx(0.3)
