@@ -154,7 +154,7 @@ def test_odometry_of_a_perfect_robot_is_exact(turn_source, distance_scale):
 
 
 def test_ticks_of_the_papers_robot_do_not_drift():
-    """One tick, 1.02 cm on a track of 15 cm, is 4 degrees; but the counts are cumulative, and driving on averages it."""
+    """One tick, 1.02 cm on a track of 15 cm, is 4 degrees; but counts are cumulative, and driving on averages it."""
     coarse, fine = dead_reckoned(ideal()).max(), dead_reckoned(ideal(ticks_per_revolution=FINE)).max()
     assert fine < coarse < 0.1
 
