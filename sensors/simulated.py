@@ -83,7 +83,7 @@ def _leg(pose: Pose, target: tuple[float, float], scenario: Scenario) -> Iterato
 
 
 class SimulatedRobot:
-    """All sensors of one robot in one scenario; a fresh object for every seed."""
+    """All sensors of one robot in one scenario; a fresh object for every run, since its random streams go on."""
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
         self.scenario = scenario
@@ -97,6 +97,7 @@ class SimulatedRobot:
         self._radios = {
             anchor.id: _Radio(anchor, self._stream(f"radio {anchor.id}"), scenario) for anchor in scenario.world.anchors
         }
+        self._ranged = itertools.cycle(sorted(self._radios))
         self._streams = {name: self._stream(name) for name in ("slip", "gyro", "wifi", "ranges")}
 
     def _stream(self, name: str) -> np.random.Generator:
@@ -113,17 +114,7 @@ class SimulatedRobot:
 
     def run(self) -> Iterator[Measurement | Truth]:
         """Every message of the run and the truth, in time order."""
-        reality = self.scenario.reality
-        every = {
-            name: round(1.0 / (hz * STEP_S)) if hz > 0.0 else 0
-            for name, hz in (
-                ("ticks", reality.ticks_hz),
-                ("gyro", reality.gyro_hz),
-                ("wifi", reality.wifi_hz),
-                ("ranges", reality.range_hz),
-                ("truth", reality.truth_hz),
-            )
-        }
+        reality, periods = self.scenario.reality, self._periods()
         single_channel = self.scenario.world.robot.encoder == "single_channel"
         rolled, slip, command = np.zeros(2), np.zeros(2), (0.0, 0.0)
         for step, moment in enumerate(drive(self.scenario)):
@@ -135,8 +126,20 @@ class SimulatedRobot:
             if single_channel and command != (moment.speed, moment.turn_rate):
                 command = (moment.speed, moment.turn_rate)
                 yield self._command(step, moment)
-            due = {name for name, period in every.items() if period and (step + 1) % period == 0}
+            due = {name for name, period in periods.items() if (step + 1) % period == 0}
             yield from self._messages(due, step, moment, rolled)
+
+    def _periods(self) -> dict[str, int]:
+        """Steps from one message of a sensor to its next, for all that are on."""
+        reality = self.scenario.reality
+        rates = {
+            "ticks": reality.ticks_hz if DRIVES[self.scenario.world.robot.drive] else 0.0,
+            "gyro": reality.gyro_hz,
+            "wifi": reality.wifi_hz,
+            "ranges": reality.range_hz if self._radios else 0.0,
+            "truth": reality.truth_hz,
+        }
+        return {name: round(1.0 / (hz * STEP_S)) for name, hz in rates.items() if hz > 0.0}
 
     def _command(self, step: int, moment: Moment) -> MotorCommand:
         """What the controller asks of the motors as the step begins: it knows the nominal track only."""
@@ -161,7 +164,7 @@ class SimulatedRobot:
         if "gyro" in due:
             noise = self._streams["gyro"].normal(0.0, self.scenario.reality.gyro_noise_std_rad_s)
             yield Gyro(time_ns, "gyro", step, moment.turn_rate + self._gyro_bias + float(noise))
-        if "ticks" in due and DRIVES[robot.drive]:
+        if "ticks" in due:
             left, right = (math.floor(side / robot.distance_per_tick_m) for side in rolled)
             yield WheelTicks(time_ns, "encoders", step, (left, right) * (DRIVES[robot.drive] // 2))
         if "wifi" in due:
@@ -169,10 +172,9 @@ class SimulatedRobot:
             deaf = self.scenario.reality.deaf_below_dbm
             yield WifiScan(time_ns, "wifi", step, tuple(RssiReading(n, r) for n, r in heard.items() if r >= deaf))
         if "ranges" in due:
-            name = sorted(self._radios)[step % len(self._radios)]
-            yield Ranges(
-                time_ns, "uwb", step, (RangeReading(name, self._radios[name].range_m(pose, self._streams["ranges"])),)
-            )
+            name = next(self._ranged)
+            away = self._radios[name].range_m(pose, self._streams["ranges"])
+            yield Ranges(time_ns, "uwb", step, (RangeReading(name, away),))
         if "truth" in due:
             yield Truth(time_ns, pose.x, pose.y, pose.heading)
 

@@ -244,6 +244,25 @@ def test_switching_a_sensor_on_leaves_the_noise_of_the_others_as_it_was():
     assert said_by(scenario, WheelTicks | WifiScan) == said_by(quiet, WheelTicks | WifiScan)
 
 
+@pytest.mark.parametrize("more", [0, 1])
+def test_every_anchor_is_ranged_in_turn_and_walls_only_lengthen(more):
+    scenario = with_reality(ideal(), range_hz=5.0, range_std_m=0.0)
+    extra = tuple(replace(scenario.world.anchors[0], id=f"extra{i}", x=6.0 + i) for i in range(more))
+    scenario = replace(scenario, world=replace(scenario.world, anchors=scenario.world.anchors + extra))
+    truths = {truth.time_ns: truth for truth in said_by(scenario, Truth)}
+    counts, excesses = {}, []
+    for ranges in said_by(scenario, Ranges):
+        ((name, range_m, _),) = ranges.readings
+        anchor, truth = scenario.world.anchor(name), truths[ranges.time_ns]
+        away = math.dist((truth.x, truth.y, scenario.world.robot.antenna_m[2]), (anchor.x, anchor.y, anchor.z))
+        excesses.append(range_m - away)
+        counts[name] = counts.get(name, 0) + 1
+    assert len(counts) == 3 + more
+    assert max(counts.values()) - min(counts.values()) <= 1
+    assert min(excesses) == pytest.approx(0.0, abs=1e-9)
+    assert max(excesses) > 0.3
+
+
 def test_gyro_reads_the_turn_rate_plus_the_bias_the_world_tells():
     scenario = ideal(gyro_bias_rad_s=0.02)
     standing = [moment.time_ns for moment in drive(scenario) if moment.turn_rate == 0.0]
