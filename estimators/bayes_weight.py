@@ -97,7 +97,7 @@ class BayesWeight:
             return state._replace(motion=state.motion.extend(measurement, self._world.robot.noise)), ()
         if not isinstance(measurement, WifiScan | Ranges):
             return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
-        seen = tuple(s._replace(variance=s.variance + s.model.bias_std**2) for s in sightings(self._world, measurement))
+        seen = sightings(self._world, measurement)
         recent = remember(state.recent, measurement.time_ns, seen, self._window_ns)
         fix = fix_from(recent, self._world.robot)
         if isinstance(fix, Reason):
@@ -164,7 +164,8 @@ class BayesWeight:
         for item in seen:
             expected = item.expect(*pose, antenna)
             row = np.array([expected.by_x, expected.by_y, expected.by_heading])
-            innovation, variance = item.value - expected.value, float(row @ p @ row) + item.variance
+            innovation = item.value - expected.value
+            variance = float(row @ p @ row) + item.variance + item.model.bias_std**2
             who = (scan.time_ns, scan.sensor, scan.seq, item.anchor.id)
             fates.append(Fate(*who, *verdict, good, innovation, variance, innovation**2 / variance))
         return tuple(fates)

@@ -38,8 +38,8 @@ def remember(recent: Recent, time_ns: int, new: tuple[Sighting, ...], window_ns:
 def fix_from(recent: Recent, robot: Robot) -> Fix | Reason:
     """The antenna's position from the remembered sightings, or the reason there is none.
 
-    Slant distances are brought to the floor with the anchors' heights; a distance's standard deviation is the
-    reading's over the model's slope there.
+    Slant distances are brought to the floor with the anchors' heights; a distance's standard deviation is that of
+    the reading, its anchor's common error included, over the model's slope there.
     """
     if len(recent) < MINIMUM_ANCHORS:
         return Reason.TOO_FEW_ANCHORS
@@ -51,5 +51,6 @@ def fix_from(recent: Recent, robot: Robot) -> Fix | Reason:
     rise = np.array([item.anchor.z - robot.antenna_m[2] for item in seen])
     flat = np.sqrt(np.maximum(slant**2 - rise**2, 1e-6))
     slopes = np.array([abs(float(item.model.slope(d))) for item, d in zip(seen, slant, strict=True)])
-    stds = np.sqrt([item.variance for item in seen]) / np.maximum(slopes, 1e-3)
+    variances = [item.variance + item.model.bias_std**2 for item in seen]
+    stds = np.sqrt(variances) / np.maximum(slopes, 1e-3)
     return trilaterate(anchors, flat, np.maximum(stds, 1e-3))

@@ -2,7 +2,7 @@
 
 Three anchors: the closed form of Moro & Mehrpouyan 2019 (eqs. 1 and 2), which subtracts the circle equations
 1 - 2 and 2 - 3 and solves the two lines that remain. More: least squares on the circles themselves, by Gauss-Newton
-from the linear solution. The covariance is that of the weighted least-squares solution, (Hᵀ R⁻¹ H)⁻¹.
+from the linear solution. The covariance is that of the method used: distance errors carried through it to first order.
 """
 
 from __future__ import annotations
@@ -87,10 +87,24 @@ def trilaterate(anchors: Array, distances: Array, stds: Array) -> Fix:
     """A fix from ``anchors`` (n, 2), ``distances`` (n,) and their ``stds`` (n,), all [m], n >= 3 and not collinear."""
     if len(anchors) == 3:
         x, y = closed_form(anchors, distances)
+        covariance = _closed_form_covariance(anchors, distances, stds)
     else:
         x, y = least_squares(anchors, distances, stds)
-    away = np.array([x, y]) - anchors
+        covariance = _least_squares_covariance(anchors, np.array([x, y]), stds)
+    return Fix(x, y, float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1]))
+
+
+def _closed_form_covariance(anchors: Array, distances: Array, stds: Array) -> Array:
+    """Distance errors carried through the two lines A p = b(d) of the closed form: A^-1 D R Dᵀ A^-T, D = db/dd."""
+    lines = 2.0 * np.diff(anchors, axis=0)
+    d1, d2, d3 = (2.0 * distances).tolist()
+    by_distance = np.linalg.solve(lines, np.array([[d1, -d2, 0.0], [0.0, d2, -d3]]))
+    return np.asarray(by_distance * stds**2 @ by_distance.T)
+
+
+def _least_squares_covariance(anchors: Array, position: Array, stds: Array) -> Array:
+    """(Hᵀ R^-1 H)^-1 at ``position``, H the unit vectors from the anchors."""
+    away = position - anchors
     directions = away / np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)[:, None]
     information = (directions / stds[:, None] ** 2).T @ directions
-    covariance = np.linalg.pinv(information, hermitian=True)
-    return Fix(x, y, float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1]))
+    return np.asarray(np.linalg.pinv(information, hermitian=True))

@@ -32,7 +32,7 @@ NOWHERE = Prior(
 
 def world(places=PLACES, robot=None):
     anchors = [{"id": name, "position_m": list(place)} for name, place in places.items()]
-    return World.from_table({"anchors": anchors, "ranging": {"std_m": 0.1}, "robot": robot or {}})
+    return World.from_table({"anchors": anchors, "ranging": {"std_m": 0.1, "bias_std_m": 0.0}, "robot": robot or {}})
 
 
 def scan(time_s, x, y, heard=THREE, places=PLACES):

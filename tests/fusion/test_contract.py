@@ -394,3 +394,15 @@ def test_command_line_answers_wrong_words(capsys):
 
 def test_public_names_exist():
     assert all(hasattr(fusion, name) for name in fusion.__all__)
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_covariance_of_a_fix_is_that_of_its_scatter(count):
+    """Outside the triangle the closed form errs more than least squares would; 4000 draws tell."""
+    anchors = np.array([[0.0, 0.0], [4.0, 0.0], [0.0, 3.0], [5.0, 6.0]])[:count]
+    place, stds = np.array([6.0, 5.0]), np.full(count, 0.02)
+    exact = np.hypot(*(anchors - place).T)
+    chance = np.random.default_rng(5)
+    fixes = np.array([trilaterate(anchors, exact + chance.normal(0, 0.02, count), stds)[:2] for _ in range(4000)])
+    claimed = trilaterate(anchors, exact, stds)
+    assert np.cov(fixes.T) == pytest.approx(np.array([[claimed.xx, claimed.xy], [claimed.xy, claimed.yy]]), rel=0.1)
