@@ -40,11 +40,11 @@ def export_csv(path: Path, folder: Path) -> list[Path]:
 
 
 def _write_world(run: Run, path: Path) -> None:
-    import tomli_w
+    import tomlkit
 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(tomli_w.dumps(json.loads(run.world.table)), encoding="utf-8")
+        path.write_text(tomlkit.dumps(json.loads(run.world.table)), encoding="utf-8")
     except OSError as error:
         raise LogError(f"{path}: cannot be written ({error}); choose another folder") from error
 
