@@ -2,17 +2,20 @@
 
 ``[world]`` is what estimators are told (a world file, `docs/world.md`), ``[route]`` is where the robot is driven, and
 ``[reality]`` is what is really so and nobody is told: shadowing, walls that swallow signal, slipping wheels, a gyro
-bias. The built-in scenarios carry the paper's path-loss exponents; their floor plans and anchor places are our own,
-since the paper's drawings are not published as data.
+bias. ``[calibration]`` may say how the numbers were found; it is for people and reports. The built-in scenarios carry
+the paper's path-loss exponents; their floor plans and anchor places are our own, since the paper's drawings are not
+published as data.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from fusion import World, WorldError
 from fusion.errors import did_you_mean
@@ -48,6 +51,10 @@ class Reality:
     range_std_m: float = 0.1
     wall_excess_m: float = 0.3
     """Mean excess of a range through walls [m]."""
+    distance_scale_bias: float = 0.0
+    """Wheels that roll further than the world says, as a share, the same in every run."""
+    track_scale_bias: float = 0.0
+    """An effective track that is wider than the world says, as a share, the same in every run."""
     distance_scale_std: float = 0.02
     track_scale_std: float = 0.05
     slip_std: float = 0.006
@@ -62,6 +69,8 @@ class Reality:
     wifi_hz: float = 2.0
     range_hz: float = 0.0
     truth_hz: float = 20.0
+    scans_at_stop: int = 0
+    """Scans averaged into one as the robot leaves a way-point, where its true pose is then surveyed; 0: neither."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +81,24 @@ class Scenario:
     world: World
     route: Route
     reality: Reality
+    calibration: Mapping[str, object] = field(default_factory=dict, compare=False)
+
+    @classmethod
+    def from_table(cls, name: str, table: Mapping[str, Any]) -> Scenario:
+        """A scenario from nested tables, as TOML gives them; raises `WorldError`."""
+        check_keys(table, dict.fromkeys(("world", "route", "reality", "calibration")), f"scenario {name}")
+        for part in ("world", "route"):
+            if not isinstance(table.get(part), dict):
+                raise WorldError(f"scenario {name}: it needs a table [{part}]; add it")
+        calibration = table.get("calibration", {})
+        if not isinstance(calibration, dict):
+            raise WorldError(f"scenario {name}: calibration: expected a table, got {calibration!r}")
+        route = read_record(Route, table["route"], f"scenario {name}: route")
+        reality = read_record(Reality, table.get("reality", {}), f"scenario {name}: reality")
+        _check_route(route, f"scenario {name}: route")
+        _check_reality(reality, f"scenario {name}: reality")
+        world = World.from_table({"name": name, **table["world"]})
+        return cls(name, world, route, reality, calibration)
 
 
 def builtin_names() -> tuple[str, ...]:
@@ -82,33 +109,24 @@ def builtin_names() -> tuple[str, ...]:
 
 def load_scenario(scenario: str | Path) -> Scenario:
     """A built-in scenario by name, or one from a file; raises `WorldError`."""
+    name = Path(scenario).stem if Path(scenario).suffix == ".toml" else str(scenario)
+    try:
+        return Scenario.from_table(name, tomllib.loads(scenario_text(scenario)))
+    except tomllib.TOMLDecodeError as error:
+        raise WorldError(f"scenario {name}: not TOML: {error}; correct that line") from error
+
+
+def scenario_text(scenario: str | Path) -> str:
+    """The text of a scenario's file; raises `WorldError` when there is none."""
     path = Path(scenario)
     if path.suffix == ".toml":
         try:
-            return _parse(path.stem, path.read_text(encoding="utf-8"))
+            return path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise WorldError(f"{path}: cannot be read ({error}); give a scenario file") from error
     if str(scenario) not in builtin_names():
         raise WorldError(f"no scenario {str(scenario)!r}; {did_you_mean(str(scenario), builtin_names())}")
-    return _parse(
-        str(scenario), resources.files("sensors").joinpath("scenarios", f"{scenario}.toml").read_text("utf-8")
-    )
-
-
-def _parse(name: str, text: str) -> Scenario:
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise WorldError(f"scenario {name}: not TOML: {error}; correct that line") from error
-    check_keys(table, dict.fromkeys(("world", "route", "reality")), f"scenario {name}")
-    for part in ("world", "route"):
-        if not isinstance(table.get(part), dict):
-            raise WorldError(f"scenario {name}: it needs a table [{part}]; add it")
-    route = read_record(Route, table["route"], f"scenario {name}: route")
-    reality = read_record(Reality, table.get("reality", {}), f"scenario {name}: reality")
-    _check_route(route, f"scenario {name}: route")
-    _check_reality(reality, f"scenario {name}: reality")
-    return Scenario(name, World.from_table({"name": name, **table["world"]}), route, reality)
+    return resources.files("sensors").joinpath("scenarios", f"{scenario}.toml").read_text("utf-8")
 
 
 def _check_route(route: Route, where: str) -> None:
@@ -122,9 +140,9 @@ def _check_route(route: Route, where: str) -> None:
 
 
 def _check_reality(reality: Reality, where: str) -> None:
-    for key in (field.name for field in dataclasses.fields(reality)):
+    for key in (entry.name for entry in dataclasses.fields(reality)):
         value = getattr(reality, key)
-        if value < 0.0 and key != "deaf_below_dbm":
+        if value < 0.0 and key != "deaf_below_dbm" and not key.endswith("_bias"):
             raise WorldError(f"{where}.{key}: {value} must not be negative; 0 turns it off")
         if key.endswith("_hz") and value * STEP_S > 1.0:
             raise WorldError(f"{where}.{key}: {value} is faster than the virtual clock; at most {1.0 / STEP_S:g}")

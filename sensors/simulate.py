@@ -9,7 +9,8 @@ from pathlib import Path
 
 from fusion import ParameterError, Truth
 from fusion.values import nanoseconds
-from sensors.scenario import builtin_names, load_scenario
+from logs.run import Run, TruthTrack
+from sensors.scenario import Scenario, builtin_names, load_scenario
 from sensors.simulated import SimulatedRobot
 
 
@@ -30,13 +31,34 @@ def simulate(scenario: str | Path, output: Path, *, seed: int = 0, duration_s: f
     loaded = load_scenario(scenario)
     robot = SimulatedRobot(loaded, seed)
     end_ns = None if duration_s is None else nanoseconds(duration_s)
-    about = {"source": "simulated", "scenario": loaded.name, "seed": str(seed)}
-    with RunWriter(output, loaded.world, name=f"{loaded.name}-{seed}", prior=robot.prior(), metadata=about) as log:
+    about, name = _about(loaded, seed), f"{loaded.name}-{seed}"
+    with RunWriter(output, loaded.world, name=name, prior=robot.prior(), metadata=about) as log:
         for message in robot.run():
             if end_ns is not None and message.time_ns > end_ns:
                 break
             log.write_truth(message) if isinstance(message, Truth) else log.write(message)
     return output
+
+
+def simulated_run(scenario: Scenario, seed: int) -> Run:
+    """One run in memory: as reading the log of `simulate` back, but for its path and the rounding of headings."""
+    robot = SimulatedRobot(scenario, seed)
+    said = list(robot.run())
+    return Run(
+        path=Path(f"{scenario.name}-{seed}.mcap"),
+        name=f"{scenario.name}-{seed}",
+        world=scenario.world,
+        prior=robot.prior(),
+        metadata=_about(scenario, seed),
+        measurements=tuple(message for message in said if not isinstance(message, Truth)),
+        truth=TruthTrack.from_truths([message for message in said if isinstance(message, Truth)]),
+        warnings=(),
+        lanes={},
+    )
+
+
+def _about(scenario: Scenario, seed: int) -> dict[str, str]:
+    return {"source": "simulated", "scenario": scenario.name, "seed": str(seed)}
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -23,9 +23,10 @@ from fusion import (
 )
 from fusion.odometry import Odometer
 from logs.reader import read_run
+from sensors.route import drive
 from sensors.scenario import builtin_names, load_scenario
-from sensors.simulate import simulate
-from sensors.simulated import SimulatedRobot, drive
+from sensors.simulate import simulate, simulated_run
+from sensors.simulated import SimulatedRobot
 
 NO_ERRORS = dict.fromkeys(
     [
@@ -71,7 +72,7 @@ def dead_reckoned(scenario, seed=0):
     """Distance from the truth [m] at every truth of a run, from the true start on odometry alone."""
     odometer, motion, errors = Odometer(scenario.world.robot), Increment(), []
     state = odometer.start(0)
-    start = Pose(*scenario.route.waypoints_m[0], next(drive(scenario)).pose.heading)
+    start = Pose(*scenario.route.waypoints_m[0], drive(scenario.route)[0].pose.heading)
     for message in SimulatedRobot(scenario, seed).run():
         if isinstance(message, Truth):
             place = start.compose(motion.pose)
@@ -131,7 +132,7 @@ def test_builtin_route_stays_on_the_floor_and_goes_through_no_wall(name):
     bounds, walls = scenario.world.bounds, scenario.world.walls
     assert all(
         bounds.x_min < moment.pose.x < bounds.x_max and bounds.y_min < moment.pose.y < bounds.y_max
-        for moment in drive(scenario)
+        for moment in drive(scenario.route)
     )
     legs = itertools.pairwise(scenario.route.waypoints_m)
     sides = [side for wall in walls for side in itertools.pairwise(wall)]
@@ -141,7 +142,7 @@ def test_builtin_route_stays_on_the_floor_and_goes_through_no_wall(name):
 @pytest.mark.parametrize("name", ["office", "mec", "arena"])
 def test_robot_ends_on_its_last_way_point(name):
     scenario = load_scenario(name)
-    *_, last = drive(scenario)
+    *_, last = drive(scenario.route)
     assert math.dist((last.pose.x, last.pose.y), scenario.route.waypoints_m[-1]) < 0.02
 
 
@@ -263,16 +264,69 @@ def test_every_anchor_is_ranged_in_turn_and_walls_only_lengthen(more):
     assert max(excesses) > 0.3
 
 
+def stops(scenario):
+    return [moment for moment in drive(scenario.route) if moment.leaving]
+
+
+def test_surveyed_stops_are_one_scan_and_one_truth_at_every_way_point_after_the_first():
+    scenario = with_reality(ideal(), scans_at_stop=20, wifi_hz=0.0, truth_hz=0.0)
+    scans, truths = said_by(scenario, WifiScan), said_by(scenario, Truth)
+    assert [(truth.x, truth.y) for truth in truths] == [
+        pytest.approx(place, abs=0.02) for place in scenario.route.waypoints_m[1:]
+    ]
+    assert (
+        [scan.time_ns for scan in scans] == [truth.time_ns for truth in truths] == [s.time_ns for s in stops(scenario)]
+    )
+
+
+def test_averaging_at_a_stop_takes_off_fading_by_the_root_of_the_count():
+    """Fading of 4 dB over 25 scans leaves 0.8 dB (rounding to whole dBm adds 0.06)."""
+    quiet = with_reality(ideal(), scans_at_stop=25, wifi_hz=0.0)
+    noisy = with_reality(quiet, fading_std_db=4.0)
+    model = np.array([[float(reading.rssi_dbm) for reading in scan.readings] for scan in said_by(quiet, WifiScan)])
+    off = [
+        np.array([[reading.rssi_dbm for reading in scan.readings] for scan in said_by(noisy, WifiScan, seed)]) - model
+        for seed in range(8)
+    ]
+    # What an ideal radio says is rounded the same way every time, by up to half a dB: that is no noise.
+    assert np.std(off, axis=0).mean() == pytest.approx(0.8, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("bias", "distance", "turn"), [("distance_scale_bias", 1.1, 1.1), ("track_scale_bias", 1.0, 1.1)]
+)
+def test_systematic_wheel_errors_are_the_same_in_every_run(bias, distance, turn):
+    """Wheels that roll 10 % further than told tell 10 % more of everything; a track 10 % wider, of turns alone."""
+    scenario = with_reality(ideal(ticks_per_revolution=FINE), **{bias: 0.1})
+    ends = [said_by(scenario, WheelTicks, seed)[-1].counts for seed in (0, 1)]
+    assert ends[0] == ends[1]
+    (left, right), (left_told, right_told) = (
+        np.array(said_by(each, WheelTicks)[-1].counts)[:2] for each in (ideal(ticks_per_revolution=FINE), scenario)
+    )
+    assert (left_told + right_told) / (left + right) == pytest.approx(distance, abs=1e-4)
+    assert (right_told - left_told) / (right - left) == pytest.approx(turn, abs=1e-3)
+
+
+def test_a_run_in_memory_is_the_run_in_its_log(tmp_path):
+    logged, held = read_run(simulate("mec", tmp_path / "mec.mcap", seed=4)), simulated_run(load_scenario("mec"), 4)
+    assert held.measurements == logged.measurements
+    assert (held.name, held.world, held.prior) == (logged.name, logged.world, logged.prior)
+    for column in ("time_ns", "x", "y"):
+        assert np.array_equal(getattr(held.truth, column), getattr(logged.truth, column))
+    # Logs hold headings as quaternions, which round.
+    assert held.truth.heading == pytest.approx(logged.truth.heading, abs=1e-12)
+
+
 def test_gyro_reads_the_turn_rate_plus_the_bias_the_world_tells():
     scenario = ideal(gyro_bias_rad_s=0.02)
-    standing = [moment.time_ns for moment in drive(scenario) if moment.turn_rate == 0.0]
+    standing = [moment.time_ns for moment in drive(scenario.route) if moment.turn_rate == 0.0]
     rates = {gyro.time_ns: gyro.rate_rad_s for gyro in said_by(scenario, Gyro)}
     assert {rates[time_ns] for time_ns in standing if time_ns in rates} == {0.02}
 
 
 def test_prior_is_off_by_what_its_covariance_says():
     scenario = load_scenario("office")
-    start = Pose(*scenario.route.waypoints_m[0], next(drive(scenario)).pose.heading)
+    start = Pose(*scenario.route.waypoints_m[0], drive(scenario.route)[0].pose.heading)
     priors = [SimulatedRobot(scenario, seed).prior() for seed in range(200)]
     off = np.array([np.subtract(prior.pose, start) for prior in priors])
     stds = np.sqrt([priors[0].covariance.xx, priors[0].covariance.yy, priors[0].covariance.hh])
@@ -298,6 +352,7 @@ def test_unknown_scenario_is_answered_with_the_nearest(name):
         ("[reality]\nshadowing_length_m = 0.0", "shadowing_length_m"),
         ("[reality]\nwall_loss = 3.0", "did you mean 'wall_loss_db'"),
         ("[truth]\nwall_loss_db = 3.0", "unknown key 'truth'"),
+        ("[reality]\nscans_at_stop = -1", "scans_at_stop: -1 must not be negative"),
         ("speed_m_s = fast", "not TOML"),
     ],
 )
