@@ -30,7 +30,6 @@ from fusion import (
     Prior,
     Ranges,
     Reason,
-    Sighting,
     Tag,
     WifiScan,
     World,
@@ -39,7 +38,7 @@ from fusion import (
     wrap_angle,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.fix import Recent, fix_from, remember
+from fusion.fix import Recent, fix_fates, fix_from, fix_innovation, remember
 from fusion.screen import unusable
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds
@@ -104,7 +103,8 @@ class BayesWeight:
             return state._replace(recent=recent), unusable(measurement, fix)
         pose, covariance = compose(state.pose, state.covariance, state.motion)
         moved, moved_covariance, good = self.weigh(pose, covariance, fix, position_known=state.position_known)
-        fates = self._fates(measurement, seen, pose, covariance, good)
+        verdict = (Decision.USED, Reason.OK) if good >= USED_FROM else (Decision.DOWNWEIGHTED, Reason.OUTLIER)
+        fates = fix_fates(measurement, seen, self._world.robot, (pose, covariance), verdict, good)
         return State(moved, moved_covariance, Increment(), (), position_known=True), fates
 
     def estimate(self, state: State, time_ns: int) -> Estimate:
@@ -122,7 +122,7 @@ class BayesWeight:
         probability is then the prior one.
         """
         p, r = np.array(covariance.matrix), np.array([[fix.xx, fix.xy], [fix.xy, fix.yy]])
-        innovation, h = self._innovation(pose, fix)
+        innovation, h = fix_innovation(pose, fix, self._world.robot)
         s = h @ p @ h.T + r
         good = self._probability_good(innovation, s) if position_known else 1.0 - self._outlier_probability
         gain = p @ h.T @ np.linalg.inv(s)
@@ -141,31 +141,3 @@ class BayesWeight:
         prior_odds = self._outlier_probability / (1.0 - self._outlier_probability)
         odds = prior_odds * self._outlier_density / peak * math.exp(min(half_nis, LARGEST_EXPONENT))
         return 1.0 / (1.0 + odds)
-
-    def _innovation(self, pose: Pose, fix: Fix) -> tuple[Array, Array]:
-        """Fix minus predicted antenna position [m], and its Jacobian by the pose, (2, 3)."""
-        forward, left, _ = self._world.robot.antenna_m
-        x, y = pose.transform(forward, left)
-        jacobian = np.array([[1.0, 0.0, -(y - pose.y)], [0.0, 1.0, x - pose.x]])
-        return np.array([fix.x - x, fix.y - y]), jacobian
-
-    def _fates(
-        self,
-        scan: WifiScan | Ranges,
-        seen: tuple[Sighting, ...],
-        pose: Pose,
-        covariance: Covariance,
-        good: float,
-    ) -> tuple[Fate, ...]:
-        """One per anchor, with the fix's probability as weight and the reading's own innovation."""
-        p, antenna = np.array(covariance.matrix), self._world.robot.antenna_m
-        verdict = (Decision.USED, Reason.OK) if good >= USED_FROM else (Decision.DOWNWEIGHTED, Reason.OUTLIER)
-        fates = []
-        for item in seen:
-            expected = item.expect(*pose, antenna)
-            row = np.array([expected.by_x, expected.by_y, expected.by_heading])
-            innovation = item.value - expected.value
-            variance = float(row @ p @ row) + item.variance + item.model.bias_std**2
-            who = (scan.time_ns, scan.sensor, scan.seq, item.anchor.id)
-            fates.append(Fate(*who, *verdict, good, innovation, variance, innovation**2 / variance))
-        return tuple(fates)

@@ -29,7 +29,7 @@ from fusion import (
 )
 from fusion.belief import starting_belief
 from fusion.errors import did_you_mean
-from fusion.fix import Recent, fix_from, remember
+from fusion.fix import Recent, fix_fates, fix_from, remember
 from fusion.screen import unusable
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds
@@ -49,6 +49,23 @@ class State(NamedTuple):
     recent: Recent
     position_known: bool
     heading_known: bool
+
+
+def allocate(odo_counter: int, epsilon: int, raised_weight: float, *, outlier: bool) -> tuple[float, int]:
+    """Algorithm 2: w_Wi-Fi and the new odoCounter; w_odo is 1 - w_Wi-Fi (its "require")."""
+    if odo_counter >= epsilon and not outlier:  # line 1
+        return raised_weight, 0  # lines 2 and 3
+    if not outlier:  # line 4
+        return 0.5, 0  # lines 5 and 6
+    return 0.0, odo_counter + 1  # lines 7 to 9
+
+
+def weighted_average(
+    odometry: tuple[float, float], wifi: tuple[float, float], wifi_weight: float
+) -> tuple[float, float]:
+    """Eq. 5: x = x_odo w_odo + x_Wi-Fi w_Wi-Fi, and the same for y."""
+    odo_weight = 1.0 - wifi_weight
+    return (odometry[0] * odo_weight + wifi[0] * wifi_weight, odometry[1] * odo_weight + wifi[1] * wifi_weight)
 
 
 class DynamicWeight:
@@ -109,7 +126,7 @@ class DynamicWeight:
         self._window_ns = nanoseconds(window_s)
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
-        """Algorithm 1, line 1: both weights 0.5, the counter 0, odometry at the start."""
+        """Algorithm 1, lines 1 and 2: both weights 0.5, counter 0, odometry at the start; anchors given."""
         pose, _ = starting_belief(self._world, prior)
         return State(pose, pose, 0.5, 0, 0.0, (), prior.position_known, prior.heading_known)
 
@@ -121,7 +138,7 @@ class DynamicWeight:
             return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
         seen = sightings(self._world, measurement)
         recent = remember(state.recent, measurement.time_ns, seen, self._window_ns)
-        fix = fix_from(recent, self._world.robot)
+        fix = fix_from(recent, self._world.robot)  # Algorithm 1, line 4
         if isinstance(fix, Reason):
             counter = state.odo_counter + int(self._count_missing)
             return state._replace(recent=recent, odo_counter=counter), unusable(measurement, fix)
@@ -148,16 +165,15 @@ class DynamicWeight:
     def _fuse(
         self, state: State, fix: tuple[float, float], scan: WifiScan | Ranges, seen: tuple[Sighting, ...]
     ) -> tuple[State, tuple[Fate, ...]]:
-        """Algorithm 1, lines 4 to 6. From an unknown position, odometry starts at the first fix."""
-        expected_from = state.odometry if state.position_known else None
+        """Algorithm 1, lines 5 and 6. From an unknown position, odometry starts at the first fix."""
+        expected = (state.odometry, None) if state.position_known else None
         if not state.position_known:
             state = state._replace(odometry=Pose(*fix, state.odometry.heading))
         x, y, heading = state.odometry
         outlier = self._is_outlier(fix, (x, y), state.travelled_m)
-        wifi_weight, counter = self.allocate(outlier=outlier, odo_counter=state.odo_counter)
-        odo_weight = 1.0 - wifi_weight
-        # Eq. 5: x = x_odo w_odo + x_Wi-Fi w_Wi-Fi, and the same for y.
-        fused = Pose(x * odo_weight + fix[0] * wifi_weight, y * odo_weight + fix[1] * wifi_weight, wrap_angle(heading))
+        # Line 5: the weights, by Algorithm 2.
+        wifi_weight, counter = allocate(state.odo_counter, self._epsilon, self._raised_weight, outlier=outlier)
+        fused = Pose(*weighted_average((x, y), fix, wifi_weight), wrap_angle(heading))  # line 6
         after = state._replace(
             fused=fused,
             odometry=fused if self._feedback else state.odometry,
@@ -166,15 +182,8 @@ class DynamicWeight:
             recent=(),
             position_known=True,
         )
-        return after, self._fates(scan, seen, expected_from, wifi_weight, outlier=outlier)
-
-    def allocate(self, *, outlier: bool, odo_counter: int) -> tuple[float, int]:
-        """Algorithm 2: the weight of the Wi-Fi fix and the new odoCounter; w_odo = 1 - w_Wi-Fi."""
-        if odo_counter >= self._epsilon and not outlier:
-            return self._raised_weight, 0
-        if not outlier:
-            return 0.5, 0
-        return 0.0, odo_counter + 1
+        verdict = (Decision.REJECTED, Reason.OUTLIER) if outlier else (Decision.USED, Reason.OK)
+        return after, fix_fates(scan, seen, self._world.robot, expected, verdict, wifi_weight)
 
     def _is_outlier(self, fix: tuple[float, float], odometry: tuple[float, float], travelled_m: float) -> bool:
         """Section III-B: differs from (x_odo, y_odo) by more than xi percent."""
@@ -187,28 +196,3 @@ class DynamicWeight:
             return away > self._share * travelled_m
         bounds = self._world.bounds
         return away > self._share * math.hypot(bounds.x_max - bounds.x_min, bounds.y_max - bounds.y_min)
-
-    def _fates(
-        self,
-        scan: WifiScan | Ranges,
-        seen: tuple[Sighting, ...],
-        odometry: Pose | None,
-        weight: float,
-        *,
-        outlier: bool,
-    ) -> tuple[Fate, ...]:
-        """One per anchor, with w_Wi-Fi as weight; no innovation where odometry expected nothing (None)."""
-        verdict = (Decision.REJECTED, Reason.OUTLIER) if outlier else (Decision.USED, Reason.OK)
-        antenna = self._world.robot.antenna_m
-        return tuple(
-            Fate(
-                scan.time_ns,
-                scan.sensor,
-                scan.seq,
-                item.anchor.id,
-                *verdict,
-                weight,
-                None if odometry is None else item.value - item.expect(*odometry, antenna).value,
-            )
-            for item in seen
-        )

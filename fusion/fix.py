@@ -1,4 +1,5 @@
-"""Memoryless position fixes from whatever radio readings lie close together in time.
+"""Memoryless position fixes from whatever radio readings lie close together in time, and what methods need that weigh
+such fixes against odometry.
 
 A Wi-Fi scan hears all anchors at once; ranging radios hear one at a time. `Recent` keeps the last reading of each
 anchor for a short window, so both give fixes by the same code.
@@ -9,13 +10,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fusion.geometry import Covariance, Pose
 from fusion.sighting import Sighting
 from fusion.trilateration import Fix, are_collinear, trilaterate
-from fusion.values import Reason
+from fusion.values import Decision, Fate, Ranges, Reason, WifiScan
 from fusion.world import Robot
 
 MINIMUM_ANCHORS = 3
+
+Array = NDArray[np.float64]
 
 
 class Heard(NamedTuple):
@@ -54,3 +59,41 @@ def fix_from(recent: Recent, robot: Robot) -> Fix | Reason:
     variances = [item.variance + item.model.bias_std**2 for item in seen]
     stds = np.sqrt(variances) / np.maximum(slopes, 1e-3)
     return trilaterate(anchors, flat, np.maximum(stds, 1e-3))
+
+
+def fix_innovation(pose: Pose, fix: Fix, robot: Robot) -> tuple[Array, Array]:
+    """Fix minus the antenna's predicted position, (2,) [m], and that position's Jacobian by the pose, (2, 3)."""
+    forward, left, _ = robot.antenna_m
+    x, y = pose.transform(forward, left)
+    jacobian = np.array([[1.0, 0.0, -(y - pose.y)], [0.0, 1.0, x - pose.x]])
+    return np.array([fix.x - x, fix.y - y]), jacobian
+
+
+def fix_fates(
+    scan: WifiScan | Ranges,
+    seen: tuple[Sighting, ...],
+    robot: Robot,
+    belief: tuple[Pose, Covariance | None] | None,
+    verdict: tuple[Decision, Reason],
+    weight: float,
+) -> tuple[Fate, ...]:
+    """One Fate per anchor of a fix that was weighed in as a whole, each with the reading's own innovation.
+
+    ``belief`` is what was expected before the scan: None where nothing was, its covariance None where none is claimed.
+    """
+    fates = []
+    for item in seen:
+        who = (scan.time_ns, scan.sensor, scan.seq, item.anchor.id)
+        numbers: tuple[float | None, ...] = (None, None, None)
+        if belief is not None:
+            pose, covariance = belief
+            expected = item.expect(*pose, robot.antenna_m)
+            innovation = item.value - expected.value
+            numbers = (innovation, None, None)
+            if covariance is not None:
+                row = np.array([expected.by_x, expected.by_y, expected.by_heading])
+                spread = float(row @ np.array(covariance.matrix) @ row)
+                variance = spread + item.variance + item.model.bias_std**2
+                numbers = (innovation, variance, innovation**2 / variance)
+        fates.append(Fate(*who, *verdict, weight, *numbers))
+    return tuple(fates)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from estimators.dynamic_weight import DynamicWeight
+from estimators.dynamic_weight import DynamicWeight, allocate
 from fusion import (
     Covariance,
     Decision,
@@ -79,8 +79,7 @@ class Robot:
     ],
 )
 def test_algorithm_2_line_by_line(outlier, counter, expected):
-    estimator = DynamicWeight(world(), epsilon=3, raised_weight=0.75)
-    assert estimator.allocate(outlier=outlier, odo_counter=counter) == expected
+    assert allocate(counter, 3, 0.75, outlier=outlier) == expected
 
 
 def test_algorithm_1_line_1_starts_with_equal_weights():
