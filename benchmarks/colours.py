@@ -28,7 +28,8 @@ ESTIMATORS: Mapping[str, Colour] = {
     "ekf": SKY,
     "particle": VERMILLION,
     "bayes_grid": BLUE,
-    # The palette has seven colours; the baselines are a shade of the method they check.
+    # The palette has seven colours; a variant or a baseline is a shade of the method it goes with.
+    "dynamic_weight_repaired": (232, 184, 212),
     "filterpy_ekf": (168, 214, 240),
     "filterpy_ukf": (138, 138, 230),
 }
