@@ -47,6 +47,10 @@ class Reality:
     fading_std_db: float = 1.5
     """Scan to scan [dB]."""
     wall_loss_db: float = 4.0
+    obstruction_share: float = 0.0
+    """How often something stands in the way of a link, drawn anew for every scan or stop; it takes an exponentially
+    distributed loss of ``obstruction_mean_db`` off."""
+    obstruction_mean_db: float = 6.0
     deaf_below_dbm: float = -92.0
     range_std_m: float = 0.1
     wall_excess_m: float = 0.3
@@ -144,6 +148,8 @@ def _check_reality(reality: Reality, where: str) -> None:
         value = getattr(reality, key)
         if value < 0.0 and key != "deaf_below_dbm" and not key.endswith("_bias"):
             raise WorldError(f"{where}.{key}: {value} must not be negative; 0 turns it off")
+        if key.endswith("_share") and value > 1.0:
+            raise WorldError(f"{where}.{key}: {value} is more than always; give a share from 0 to 1")
         if key.endswith("_hz") and value * STEP_S > 1.0:
             raise WorldError(f"{where}.{key}: {value} is faster than the virtual clock; at most {1.0 / STEP_S:g}")
     if reality.shadowing_length_m == 0.0:

@@ -37,7 +37,8 @@ from sensors.scenario import STEP_S, Scenario
 
 SLIP_STEPS = 50
 
-Rolled = NDArray[np.float64]
+Steps = NDArray[np.float64]
+"""One row per step of the virtual clock."""
 
 
 class SimulatedRobot:
@@ -57,7 +58,7 @@ class SimulatedRobot:
             for anchor in scenario.world.anchors
         }
         self._ranged = itertools.cycle(sorted(self._channels))
-        self._streams = {name: self._stream(name) for name in ("slip", "gyro", "wifi", "ranges")}
+        self._streams = {name: self._stream(name) for name in ("slip", "gyro", "wifi", "ranges", "obstruction")}
 
     def _stream(self, name: str) -> np.random.Generator:
         return np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=(zlib.crc32(name.encode()),)))
@@ -74,13 +75,13 @@ class SimulatedRobot:
     def run(self) -> Iterator[Measurement | Truth]:
         """Every message of the run and the truth, in time order."""
         moments = drive(self.scenario.route)
-        rolled = self._roll(moments)
+        rolled, turn_rates = self._roll(moments), self._turn_rates(moments)
         commanded = self._commanded(moments)
         due = self._due(moments)
         for step in sorted(commanded | due.keys()):
             if step in commanded:
                 yield self._command(step, moments[step])
-            yield from self._messages(due.get(step, ()), step, moments[step], rolled[step])
+            yield from self._messages(due.get(step, ()), step, moments[step], rolled[step], turn_rates[step])
 
     def _due(self, moments: tuple[Moment, ...]) -> dict[int, list[str]]:
         """The sensors that speak at the end of a step."""
@@ -125,7 +126,7 @@ class SimulatedRobot:
         sides = (moment.speed - sideways, moment.speed + sideways)
         return MotorCommand(moment.time_ns - nanoseconds(STEP_S), "motors", step, sides * (DRIVES[robot.drive] // 2))
 
-    def _roll(self, moments: tuple[Moment, ...]) -> Rolled:
+    def _roll(self, moments: tuple[Moment, ...]) -> Steps:
         """What the left and right encoders have counted by the end of each step [m], (n, 2).
 
         A slipping wheel rolls further than the robot goes.
@@ -142,13 +143,23 @@ class SimulatedRobot:
         turned = np.stack([ahead - sideways, ahead + sideways], axis=1) * STEP_S * self._roll_scale * (1.0 + slip)
         return np.asarray(np.cumsum(np.abs(turned) if self._single_channel else turned, axis=0))
 
+    def _turn_rates(self, moments: tuple[Moment, ...]) -> Steps:
+        """The mean turn rate [rad/s] of the gyro period that ends with each step, (n,).
+
+        A gyro samples far faster than it reports, and its low-pass filter keeps what it turned in between.
+        """
+        period = self._periods().get("gyro", 1)
+        turned = np.cumsum([moment.turn_rate for moment in moments])
+        before = np.concatenate([np.zeros(period), turned])[: len(moments)]
+        return np.asarray((turned - before) / period)
+
     def _messages(
-        self, due: Collection[str], step: int, moment: Moment, rolled: Rolled
+        self, due: Collection[str], step: int, moment: Moment, rolled: Steps, turn_rate: float
     ) -> Iterator[Measurement | Truth]:
         robot, time_ns, pose = self.scenario.world.robot, moment.time_ns, moment.pose
         if "gyro" in due:
             noise = self._streams["gyro"].normal(0.0, self.scenario.reality.gyro_noise_std_rad_s)
-            yield Gyro(time_ns, "gyro", step, moment.turn_rate + self._gyro_bias + float(noise))
+            yield Gyro(time_ns, "gyro", step, float(turn_rate + self._gyro_bias + noise))
         if "ticks" in due:
             left, right = (math.floor(side / robot.distance_per_tick_m) for side in rolled)
             yield WheelTicks(time_ns, "encoders", step, (left, right) * (DRIVES[robot.drive] // 2))
@@ -166,5 +177,17 @@ class SimulatedRobot:
     def _scan(self, step: int, moment: Moment, count: int) -> WifiScan:
         """The mean of ``count`` scans in a row, without the anchors that are too weak on average."""
         stream, deaf = self._streams["wifi"], self.scenario.reality.deaf_below_dbm
-        heard = {name: channel.rssi_dbm(moment.pose, stream, count) for name, channel in self._channels.items()}
+        heard = {
+            name: channel.rssi_dbm(moment.pose, stream, count) - self._obstruction_db()
+            for name, channel in self._channels.items()
+        }
         return WifiScan(moment.time_ns, "wifi", step, tuple(RssiReading(n, r) for n, r in heard.items() if r >= deaf))
+
+    def _obstruction_db(self) -> float:
+        """What people and things that stand in the way of one link take off for one scan, or for one stop [dB]."""
+        reality, stream = self.scenario.reality, self._streams["obstruction"]
+        obstructed, loss_db = (
+            stream.random() < reality.obstruction_share,
+            stream.exponential(reality.obstruction_mean_db),
+        )
+        return float(loss_db) if obstructed else 0.0

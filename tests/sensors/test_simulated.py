@@ -317,11 +317,30 @@ def test_a_run_in_memory_is_the_run_in_its_log(tmp_path):
     assert held.truth.heading == pytest.approx(logged.truth.heading, abs=1e-12)
 
 
-def test_gyro_reads_the_turn_rate_plus_the_bias_the_world_tells():
-    scenario = ideal(gyro_bias_rad_s=0.02)
-    standing = [moment.time_ns for moment in drive(scenario.route) if moment.turn_rate == 0.0]
-    rates = {gyro.time_ns: gyro.rate_rad_s for gyro in said_by(scenario, Gyro)}
-    assert {rates[time_ns] for time_ns in standing if time_ns in rates} == {0.02}
+def test_gyro_integrates_to_the_heading_plus_the_bias_the_world_tells_however_slow_it_is():
+    """Sums of its readings over their period are the true heading at its stamps, turns between two of them included."""
+    scenario = with_reality(ideal(gyro_bias_rad_s=0.02), gyro_hz=4.0)
+    headings = {moment.time_ns: moment.pose.heading for moment in drive(scenario.route)}
+    heading = drive(scenario.route)[0].pose.heading
+    for gyro in said_by(scenario, Gyro):
+        heading += 0.25 * (gyro.rate_rad_s - 0.02)
+        assert math.remainder(heading - headings[gyro.time_ns], math.tau) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+def test_obstructions_take_off_what_they_are_said_to_as_often_as_they_are_said_to(share):
+    clear = ideal()
+    obstructed = with_reality(clear, obstruction_share=share, obstruction_mean_db=5.0)
+    losses = np.array(
+        [
+            before.rssi_dbm - after.rssi_dbm
+            for one, other in zip(said_by(clear, WifiScan), said_by(obstructed, WifiScan), strict=True)
+            for before, after in zip(one.readings, other.readings, strict=True)
+        ]
+    )
+    assert (losses > 0.0).mean() == pytest.approx(share, abs=0.03)
+    if share:
+        assert losses[losses > 0.0].mean() == pytest.approx(5.0, rel=0.1)
 
 
 def test_prior_is_off_by_what_its_covariance_says():
@@ -352,6 +371,7 @@ def test_unknown_scenario_is_answered_with_the_nearest(name):
         ("[reality]\nshadowing_length_m = 0.0", "shadowing_length_m"),
         ("[reality]\nwall_loss = 3.0", "did you mean 'wall_loss_db'"),
         ("[truth]\nwall_loss_db = 3.0", "unknown key 'truth'"),
+        ("[reality]\nobstruction_share = 1.1", "obstruction_share: 1.1 is more than always"),
         ("[reality]\nscans_at_stop = -1", "scans_at_stop: -1 must not be negative"),
         ("speed_m_s = fast", "not TOML"),
     ],
