@@ -9,7 +9,6 @@ counts exactly once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -72,8 +71,7 @@ class _GyroAngle(NamedTuple):
         return self.angle + self.rate * seconds(time_ns - self.time_ns)
 
 
-@dataclass(frozen=True, slots=True)
-class OdometerState:
+class OdometerState(NamedTuple):
     """What the odometer remembers. ``covered_ns``: motion is accounted for up to here."""
 
     covered_ns: int
@@ -113,7 +111,7 @@ class Odometer:
         if isinstance(measurement, MotorCommand):
             self._require_wheels(len(measurement.wheel_speeds_m_s), measurement)
             forward = tuple(-1 if speed < 0.0 else 1 for speed in measurement.wheel_speeds_m_s)
-            return replace(state, forward=forward), ()
+            return state._replace(forward=forward), ()
         if isinstance(measurement, Gyro):
             return self._gyro(state, measurement)
         state, motion = self.hold(state, measurement.time_ns)
@@ -138,8 +136,7 @@ class Odometer:
                 duration_s = seconds(until_ns - state.covered_ns) if measured else 0.0
                 distance, turn = state.speed_m_s * duration_s, state.turn_rate_rad_s * duration_s
                 motion.append(Odometry(until_ns, "held", 0, state.covered_ns, distance, turn, measured))
-                state = replace(
-                    state,
+                state = state._replace(
                     covered_ns=until_ns,
                     held_distance_m=state.held_distance_m + distance,
                     held_turn_rad=state.held_turn_rad + turn,
@@ -155,15 +152,17 @@ class Odometer:
             if odometry.time_ns - state.gyro.time_ns <= MAX_GYRO_AGE_NS:
                 turn = angle - state.gyro_angle_at_last
         span_ns = odometry.time_ns - odometry.from_ns
-        remaining = replace(
-            odometry,
-            from_ns=min(state.covered_ns, odometry.time_ns),
-            distance_m=odometry.distance_m - state.held_distance_m,
-            turn_rad=turn - state.held_turn_rad,
+        remaining = Odometry(
+            odometry.time_ns,
+            odometry.sensor,
+            odometry.seq,
+            min(state.covered_ns, odometry.time_ns),
+            odometry.distance_m - state.held_distance_m,
+            turn - state.held_turn_rad,
+            odometry.measured,
         )
         span_s = max(seconds(span_ns), 1e-9)
-        return replace(
-            state,
+        return state._replace(
             covered_ns=max(state.covered_ns, odometry.time_ns),
             last_ns=odometry.time_ns,
             span_ns=span_ns,
@@ -176,10 +175,10 @@ class Odometer:
 
     def _ticks(self, state: OdometerState, ticks: WheelTicks) -> tuple[OdometerState, tuple[Odometry, ...]]:
         self._require_wheels(len(ticks.counts), ticks)
-        before, counted = state.counts, replace(state, counts=ticks.counts)
+        before, counted = state.counts, state._replace(counts=ticks.counts)
         if before is None:
             angle = state.gyro.at(ticks.time_ns) if state.gyro else 0.0
-            return replace(counted, last_ns=ticks.time_ns, gyro_angle_at_last=angle), ()
+            return counted._replace(last_ns=ticks.time_ns, gyro_angle_at_last=angle), ()
         signs = state.forward if self.robot.encoder == "single_channel" and state.forward else (1,) * len(before)
         per_tick = self.robot.distance_per_tick_m
         rolled = [sign * per_tick * (now - then) for sign, now, then in zip(signs, ticks.counts, before, strict=True)]
@@ -190,7 +189,7 @@ class Odometer:
         distance *= self._distance.scale
         if distance and not state.moving:
             distance += self._distance.offset_m if distance > 0.0 else -self._distance.offset_m
-        counted = replace(counted, moving=bool(distance))
+        counted = counted._replace(moving=bool(distance))
         return self._real(
             counted, Odometry(ticks.time_ns, ticks.sensor, ticks.seq, state.last_ns, distance, wrap_angle(turn))
         )
@@ -201,7 +200,7 @@ class Odometer:
         rate, before = gyro.rate_rad_s - self.robot.gyro_bias_rad_s, state.gyro
         if before is None:
             first = _GyroAngle(gyro.time_ns, 0.0, rate)
-            return replace(state, gyro=first, gyro_angle_at_last=first.at(state.last_ns)), ()
+            return state._replace(gyro=first, gyro_angle_at_last=first.at(state.last_ns)), ()
         mean_rate = 0.5 * (before.rate + rate)
         angle = before.angle + mean_rate * seconds(gyro.time_ns - before.time_ns)
-        return replace(state, gyro=_GyroAngle(gyro.time_ns, angle, rate)), ()
+        return state._replace(gyro=_GyroAngle(gyro.time_ns, angle, rate)), ()

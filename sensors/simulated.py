@@ -157,12 +157,12 @@ class SimulatedRobot:
         self, due: Collection[str], step: int, moment: Moment, rolled: Steps, turn_rate: float
     ) -> Iterator[Measurement | Truth]:
         robot, time_ns, pose = self.scenario.world.robot, moment.time_ns, moment.pose
-        if "gyro" in due:
-            noise = self._streams["gyro"].normal(0.0, self.scenario.reality.gyro_noise_std_rad_s)
-            yield Gyro(time_ns, "gyro", step, float(turn_rate + self._gyro_bias + noise))
         if "ticks" in due:
             left, right = (math.floor(side / robot.distance_per_tick_m) for side in rolled)
             yield WheelTicks(time_ns, "encoders", step, (left, right) * (DRIVES[robot.drive] // 2))
+        if "gyro" in due:
+            noise = self._streams["gyro"].normal(0.0, self.scenario.reality.gyro_noise_std_rad_s)
+            yield Gyro(time_ns, "gyro", step, float(turn_rate + self._gyro_bias + noise))
         if "wifi" in due:
             yield self._scan(step, moment, 1)
         if "ranges" in due:
