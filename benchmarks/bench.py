@@ -6,13 +6,14 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import fusion
+from benchmarks.arguments import at_least_one
 from benchmarks.cell import STATUSES, Cell, Score, cached_run, crashed, score_cell
+from benchmarks.progress import Progress, progress_bar
 from benchmarks.score import pool
 from benchmarks.workers import compute
 from fusion import FusionError, LogError, ParameterError
@@ -23,13 +24,6 @@ LOST = "the worker process died, twice; run it alone with --workers 1 to see why
 
 Settings = Mapping[str, Mapping[str, object]]
 """Parameters by estimator."""
-
-
-class Progress(Protocol):
-    """Told how far the bench is: cells done, of how many, and which was last."""
-
-    def __call__(self, done: int, total: int, what: str) -> None:
-        """One more cell is done."""
 
 
 def bench(
@@ -128,20 +122,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", type=Path, metavar="OUT", help="write one record per run and estimator; - for stdout")
     parser.add_argument("--seed", type=int, default=0, help="of the estimators that draw random numbers")
-    parser.add_argument("--workers", type=_at_least_one, metavar="N", help="processes; one per core by default")
-
-
-def _at_least_one(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{number} workers do nothing; give 1 or more")
-    return number
+    parser.add_argument("--workers", type=at_least_one, metavar="N", help="processes; one per core by default")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Bench, print the tables, write the records. Exit code 1 when no estimator survived."""
     chosen = arguments.estimators.split(",") if arguments.estimators else None
-    with _progress_bar() as progress:
+    with progress_bar("bench") as progress:
         scores = bench(
             arguments.runs,
             estimators=chosen,
@@ -186,18 +173,3 @@ def write_records(scores: Sequence[Score], output: Path) -> None:
         output.write_text(text, encoding="utf-8")
     except OSError as error:
         raise FusionError(f"{output}: scores cannot be written ({error.strerror}); give another place") from error
-
-
-@contextmanager
-def _progress_bar() -> Iterator[Progress]:
-    """A bar on stderr where somebody looks at it."""
-    from rich.console import Console
-    from rich.progress import Progress as Bar
-
-    with Bar(console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True) as bar:
-        task = bar.add_task("bench", total=None)
-
-        def tell(done: int, total: int, what: str) -> None:
-            bar.update(task, completed=done, total=total, description=what)
-
-        yield tell

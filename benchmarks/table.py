@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from typing import IO, NamedTuple
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
 from benchmarks.cell import STATUSES, Score
-
-WIDTH = 120
-"""Columns of a table that goes into a file or a pipe."""
+from benchmarks.sheet import console
 
 
 class Column(NamedTuple):
@@ -52,16 +48,14 @@ def ranked(scores: Sequence[Score]) -> list[Score]:
 
 def print_tables(scores: Sequence[Score], pooled: Sequence[Score], file: IO[str] | None = None) -> None:
     """One table per run, and one over all of them where there are several."""
-    console = Console(file=file or sys.stdout)
-    if not console.is_terminal:
-        console.width = WIDTH
+    output = console(file)
     by_log: dict[object, list[Score]] = {}
     for score in scores:
         by_log.setdefault(score.facts.get("log", score.run), []).append(score)
     for own in by_log.values():
-        console.print(_table(own[0].run, own))
+        output.print(_table(own[0].run, own))
     if len(by_log) > 1:
-        console.print(_table(f"all {len(by_log)} runs together", pooled))
+        output.print(_table(f"all {len(by_log)} runs together", pooled))
 
 
 def _table(title: str, scores: Sequence[Score]) -> Table:

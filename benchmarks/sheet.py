@@ -1,0 +1,66 @@
+"""A table of texts that can be printed, put into a Markdown page and into an HTML page, always saying the same."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import IO, TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+WIDTH = 120
+"""Columns of a table that goes into a file or a pipe."""
+
+
+class Sheet(NamedTuple):
+    """Rows as long as ``head``; the first column names them, the others are numbers and stand right, but ``prose``."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    prose: bool = False
+
+
+def console(file: IO[str] | None = None) -> Console:
+    """Where tables are printed: as wide as the terminal, or `WIDTH`."""
+    from rich.console import Console
+
+    made = Console(file=file or sys.stdout)
+    if not made.is_terminal:
+        made.width = WIDTH
+    return made
+
+
+def print_sheets(sheets: Sequence[Sheet], file: IO[str] | None = None) -> None:
+    """For a terminal, or a file of 120 columns."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    output = console(file)
+    for sheet in sheets:
+        table = Table(title=sheet.title, box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
+        for place, title in enumerate(sheet.head):
+            table.add_column(title, justify="left" if place == 0 or sheet.prose else "right")
+        for row in sheet.rows:
+            table.add_row(*row)
+        output.print(table)
+
+
+def as_markdown(sheet: Sheet) -> str:
+    r"""A pipe table under its title in bold.
+
+    >>> print(as_markdown(Sheet("Sizes", ("what", "m"), (("a|b", "1"),))))
+    **Sizes**
+    <BLANKLINE>
+    | what | m |
+    |---|--:|
+    | a\|b | 1 |
+    """
+    rules = ["---", *(["---" if sheet.prose else "--:"] * (len(sheet.head) - 1))]
+    lines = [_row(sheet.head), "|" + "|".join(rules) + "|", *map(_row, sheet.rows)]
+    return f"**{sheet.title}**\n\n" + "\n".join(lines)
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
