@@ -14,7 +14,7 @@ WIDTH = 120
 
 
 class Sheet(NamedTuple):
-    """Rows as long as ``head``; the first column names them, the others are numbers and stand right, but ``prose``."""
+    """``head`` names the columns. The first names the rows, the others hold numbers, or ``prose`` that stands left."""
 
     title: str
     head: tuple[str, ...]
