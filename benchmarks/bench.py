@@ -15,7 +15,7 @@ from benchmarks.arguments import at_least_one
 from benchmarks.cell import STATUSES, Cell, Score, cached_run, crashed, score_cell
 from benchmarks.progress import Progress, progress_bar
 from benchmarks.score import pool
-from benchmarks.workers import compute
+from benchmarks.workers import Loss, compute
 from fusion import FusionError, LogError, ParameterError
 from fusion.errors import did_you_mean
 
@@ -52,7 +52,7 @@ def bench(
     return [scores[index] for index in sorted(scores)]
 
 
-def _lost(cell: Cell) -> Score:
+def _lost(cell: Cell, _: Loss) -> Score:
     return crashed(cell, LOST)
 
 

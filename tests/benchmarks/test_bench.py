@@ -2,9 +2,6 @@
 
 import json
 import math
-import operator
-import os
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +13,6 @@ from benchmarks.cell import Score
 from benchmarks.lane import run_lane
 from benchmarks.prior import starting_prior
 from benchmarks.table import print_tables, ranked
-from benchmarks.workers import compute
 from fusion import Covariance, Decision, Estimate, LogError, Odometry, ParameterError, PluginError, Pose, Prior, Truth
 from logs.run import Run, TruthTrack
 from logs.writer import RunWriter
@@ -220,12 +216,6 @@ def test_prior_from_truth_without_heading_leaves_the_heading_unknown():
     assert prior.position_known
     assert not prior.heading_known
     assert prior.pose == Pose(1.0, 2.0, 0.0)
-
-
-def test_a_worker_that_dies_costs_its_own_cell_only():
-    tasks = [partial(pow, 2, 1), partial(pow, 2, 2), partial(os._exit, 1), partial(pow, 2, 4), partial(pow, 2, 5)]
-    results = dict(compute(operator.call, lambda task: f"lost {task.args}", tasks, workers=2))
-    assert [results[index] for index in range(5)] == [2, 4, "lost (1,)", 16, 32]
 
 
 def test_unscored_record_has_no_metrics():
