@@ -32,6 +32,7 @@ VERBS = {
     "bench": Verb("benchmarks.bench", "score estimators on recorded runs"),
     "replay": Verb("benchmarks.replay", "run one estimator over a log and record what it said"),
     "review": Verb("benchmarks.review", "see a run and its estimators in Rerun"),
+    "reproduce": Verb("benchmarks.paper.reproduce", "the paper's experiments run again, and its claims judged"),
     "estimators": Verb("fusion.listing", "what estimators are installed, and their parameters"),
     "check": Verb("fusion.check", "hold an estimator against the contract"),
 }

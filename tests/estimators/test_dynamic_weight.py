@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from estimators.dynamic_weight import DynamicWeight, allocate
+from estimators.dynamic_weight import DynamicWeight, allocate, weighted_average
 from fusion import (
     Covariance,
     Decision,
@@ -17,6 +17,8 @@ from fusion import (
     RangeReading,
     Ranges,
     Reason,
+    RssiReading,
+    WifiScan,
     World,
 )
 from fusion.values import NANOSECONDS as SECOND
@@ -82,7 +84,7 @@ def test_algorithm_2_line_by_line(outlier, counter, expected):
     assert allocate(counter, 3, 0.75, outlier=outlier) == expected
 
 
-def test_algorithm_1_line_1_starts_with_equal_weights():
+def test_algorithm_1_lines_1_and_2_start_with_equal_weights():
     state = Robot().state
     assert (state.wifi_weight, state.odo_counter) == (0.5, 0)
 
@@ -96,7 +98,24 @@ def test_algorithm_1_line_3_moves_from_the_previous_location():
     assert robot.estimate.pose == pytest.approx((5.0, 5.0, math.pi / 2))
 
 
-def test_equation_5_halves_the_difference_to_a_good_fix():
+def test_algorithm_1_line_4_trilaterates_signal_strengths():
+    """P0 = -40 dBm, n = 2. From (4, 3) anchors a and b are 5 m away, c is sqrt(18) m: -40 - 20 log10(d) = -53.979400,
+    -53.979400, -52.552725 dBm. Odometry at (4.2, 2.8) is halved with that fix: (4.1, 2.9).
+    """
+    anchors = [{"id": name, "position_m": list(at)} for name, at in PLACES.items()]
+    radio = {"reference_rssi_dbm": -40.0, "path_loss_exponent": 2.0}
+    robot = Robot(World.from_table({"anchors": anchors, "radio": radio}), Pose(4.2, 2.8, 0.0))
+    heard = {"a": -53.979400, "b": -53.979400, "c": -52.552725}
+    robot.step(WifiScan(SECOND, "wifi", 1, tuple(RssiReading(name, dbm) for name, dbm in heard.items())))
+    assert robot.position == pytest.approx((4.1, 2.9), abs=1e-5)
+
+
+def test_equation_5_by_hand():
+    """w_Wi-Fi = 0.75: x = 4 * 0.25 + 4.2 * 0.75 = 4.15, y = 3 * 0.25 + 2.8 * 0.75 = 2.85."""
+    assert weighted_average((4.0, 3.0), (4.2, 2.8), 0.75) == pytest.approx((4.15, 2.85))
+
+
+def test_algorithm_1_lines_5_and_6_weigh_the_fix_in():
     """x = 4 * 0.5 + 4.2 * 0.5 = 4.1, y = 3 * 0.5 + 2.8 * 0.5 = 2.9."""
     robot = Robot()
     fates = robot.scan(*GOOD)

@@ -1,0 +1,129 @@
+"""The page a researcher can cite: `page.md` with its tables and figures put in, as Markdown or as one HTML file."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
+
+from benchmarks.paper.assumptions import MAIN, PREMISE
+from benchmarks.paper.claims import NOT_REPRODUCED, REPRODUCED
+from benchmarks.paper.figures import FIGURES, as_png, require_matplotlib
+from benchmarks.paper.published import EKF
+from benchmarks.paper.readings import literal
+from benchmarks.paper.report import Report
+from benchmarks.paper.tables import beating, filling_curves
+from benchmarks.sheet import as_markdown
+from fusion import FusionError
+
+PLACE = re.compile(r"\{\{(table|figure|text) (\w+)\}\}")
+STYLE = """
+:root { color-scheme: light dark; }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
+table { display: block; overflow-x: auto; border-collapse: collapse; font-size: 0.85rem; margin: 0.5rem 0 1.5rem; }
+th, td { border-bottom: 1px solid #8884; padding: 0.25rem 0.6rem; vertical-align: top; }
+th { text-align: left; }
+img { max-width: 100%; background: white; }
+td[style*="right"] { white-space: nowrap; }
+code { font-size: 0.9em; }
+"""
+
+
+def markdown(report: Report, figure_link: Callable[[str], str]) -> str:
+    """The page, with figures linked to as ``figure_link`` says."""
+    text = resources.files("benchmarks").joinpath("paper", "page.md").read_text(encoding="utf-8")
+
+    def filled(place: re.Match[str]) -> str:
+        kind, name = place.groups()
+        if kind == "table":
+            return as_markdown(report.sheets[name])
+        if kind == "figure":
+            return f"![{(FIGURES[name].__doc__ or name).splitlines()[0]}]({figure_link(name)})"
+        return texts(report)[name]
+
+    return PLACE.sub(filled, text)
+
+
+def texts(report: Report) -> dict[str, str]:
+    """Sentences that hang on the numbers."""
+    verdicts = [each.verdict for each in report.judged]
+    whole, missing = verdicts.count(REPRODUCED), verdicts.count(NOT_REPRODUCED)
+    nearest = report.ranked[0]
+    return {
+        "trials": str(len(report.outcomes[0].seeds)),
+        "seeds": f"{report.outcomes[0].seeds[0]} to {report.outcomes[0].seeds[-1]}",
+        "verdict": (
+            f"Of {len(verdicts)} claims {whole} hold in nearly every run, {missing} in nearly none, the other "
+            f"{len(verdicts) - whole - missing} in a part of the runs or not in every environment."
+        ),
+        "answer": answer(report),
+        "factors": ", ".join(
+            f"{outcome.environment.short} {outcome.scenario.calibration['odometry_factor']}"
+            for outcome in report.outcomes
+        ),
+        "nearest": (
+            f"Of {len(report.ranked)} readings the closest to the published maxima takes outliers in percent "
+            f"{nearest.reading}: off by a mean factor of {nearest.factor:.2f}."
+        ),
+    }
+
+
+def answer(report: Report) -> str:
+    """Does the claim hold, and when does it break: how often the method beats both, here and where it does best."""
+
+    def beats(curve: str, key: str) -> str:
+        shares = []
+        for outcome in report.outcomes:
+            curves = filling_curves(outcome, key)
+            shares.append(f"{outcome.environment.short} {beating(curves, curve)}")
+        return ", ".join(shares)
+
+    read, loose = literal().scale, "travelled"
+    return (
+        f"How often the method beats both odometry and Wi-Fi: read literally, {beats(read, MAIN.key)}; where Wi-Fi is "
+        f"accurate but for outliers, the premise of the paper's section III-A, {beats(read, PREMISE.key)}; there, with "
+        f"the ten percent taken of the distance travelled, {beats(loose, PREMISE.key)}. The EKF on the same runs: "
+        f"{beats(EKF, MAIN.key)}; {beats(EKF, PREMISE.key)}."
+    )
+
+
+def write_markdown(report: Report, path: Path) -> list[Path]:
+    """The page at ``path``, its figures beside it as ``<stem>-<figure>.png``; raises `FusionError`."""
+    require_matplotlib()
+    figures = {name: path.with_name(f"{path.stem}-{name}.png") for name in FIGURES}
+    write(path, markdown(report, lambda name: figures[name].name).encode())
+    for name, place in figures.items():
+        write(place, as_png(FIGURES[name](report.outcomes)))
+    return [path, *figures.values()]
+
+
+def write_html(report: Report, path: Path) -> None:
+    """One self-contained file; raises `FusionError`."""
+    require_matplotlib()
+    from markdown_it import MarkdownIt
+
+    def inline(name: str) -> str:
+        picture = as_png(FIGURES[name](report.outcomes))
+        return "data:image/png;base64," + base64.b64encode(picture).decode()
+
+    body = MarkdownIt("commonmark").enable("table").render(markdown(report, inline))
+    title = "Hybrid localization, reproduced"
+    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
+    write(path, f'<!doctype html><html lang="en"><head>{head}<style>{STYLE}</style></head>{body}</html>\n'.encode())
+
+
+def write_png(report: Report, path: Path) -> None:
+    """The paper's three result figures; raises `FusionError`."""
+    require_matplotlib()
+    write(path, as_png(FIGURES["errors"](report.outcomes)))
+
+
+def write(path: Path, content: bytes) -> None:
+    """Raises `FusionError` where that cannot be."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    except OSError as error:
+        raise FusionError(f"{path}: cannot be written ({error.strerror}); give another place") from error

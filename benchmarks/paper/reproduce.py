@@ -1,0 +1,99 @@
+"""``fusion reproduce``: the paper's experiments run again, its tables beside ours, a verdict on every claim."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from benchmarks.arguments import at_least_one
+from benchmarks.paper.calibrated import write_calibrated
+from benchmarks.paper.experiment import run_experiments
+from benchmarks.paper.figures import require_matplotlib
+from benchmarks.paper.page import write, write_html, write_markdown, write_png
+from benchmarks.paper.report import Report
+from benchmarks.progress import Progress, progress_bar
+from benchmarks.sheet import print_sheets
+
+TRIALS = 200
+
+
+def reproduce(
+    trials: int = TRIALS,
+    *,
+    seed: int = 0,
+    scenarios: Path | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """Run every experiment ``trials`` times, from ``seed`` on; the same report whatever the ``workers``.
+
+    ``scenarios``: a folder of scenario files that `write_calibrated` has made, None for the built-in ones.
+    ``workers`` None: one per core. Raises `ParameterError` or `WorldError` before any work.
+    """
+    chosen = os.cpu_count() or 1 if workers is None else workers
+    return Report.of(
+        run_experiments(trials, seed=seed, scenarios=scenarios, workers=chosen, progress=progress or (lambda *_: None))
+    )
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion reproduce``."""
+    parser.add_argument("--trials", type=at_least_one, default=TRIALS, metavar="N", help="runs each (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the first run; the next counts one up")
+    parser.add_argument("--json", type=Path, metavar="F", help="every number, in metres")
+    parser.add_argument("--html", type=Path, metavar="F", help="the whole page in one file, figures in it")
+    parser.add_argument("--png", type=Path, metavar="F", help="the paper's result figures")
+    parser.add_argument("--markdown", type=Path, metavar="F", help="the page, its figures beside it: docs/paper.md")
+    parser.add_argument("--workers", type=at_least_one, metavar="N", help="processes; one per core by default")
+    parser.add_argument("--scenarios", type=Path, metavar="FOLDER", help="scenarios that --calibrate has written")
+    parser.add_argument(
+        "--calibrate",
+        type=Path,
+        metavar="FOLDER",
+        help="solve for what the paper does not give, write scenarios there, and do nothing else (an hour)",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Calibrate; or run, print, write."""
+    if arguments.calibrate is not None:
+        workers = arguments.workers or os.cpu_count() or 1
+        for path in write_calibrated(arguments.calibrate, scenarios=arguments.scenarios, workers=workers, told=_tell):
+            sys.stdout.write(f"{path}\n")
+        return 0
+    writers = _writers(arguments)
+    with progress_bar("reproduce") as progress:
+        report = reproduce(
+            arguments.trials,
+            seed=arguments.seed,
+            scenarios=arguments.scenarios,
+            workers=arguments.workers,
+            progress=progress,
+        )
+    for remark in report.remarks:
+        _tell(remark)
+    print_sheets(list(report.sheets.values()))
+    for path, writer in writers:
+        writer(report, path)
+        sys.stdout.write(f"{path}\n")
+    return 0
+
+
+def _writers(arguments: argparse.Namespace) -> list[tuple[Path, Callable[[Report, Path], object]]]:
+    """What is to be written where. What figures need is looked for before minutes are spent."""
+    drawn = [(arguments.html, write_html), (arguments.png, write_png), (arguments.markdown, write_markdown)]
+    if any(path for path, _ in drawn):
+        require_matplotlib()
+    return [(path, writer) for path, writer in [(arguments.json, _write_json), *drawn] if path is not None]
+
+
+def _write_json(report: Report, path: Path) -> None:
+    write(path, (json.dumps(report.record(), allow_nan=False) + "\n").encode())
+
+
+def _tell(what: str) -> None:
+    sys.stderr.write(f"fusion reproduce: {what}\n")

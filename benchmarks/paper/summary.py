@@ -1,0 +1,56 @@
+"""What many seeds say together: the middle and the spread of a number, and how often something held."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.instants import Floats
+from benchmarks.score import quantile
+
+LEVEL = 0.90
+"""Of all intervals."""
+CLEARLY_M = 0.001
+"""Less is no difference. A method that refused every fix is odometry, and rounding must not make it the better one."""
+
+
+def beats_both(errors_m: Floats, odometry_m: Floats, wifi_m: Floats) -> NDArray[np.bool_]:
+    """Whether errors [m] are clearly below those of odometry and those of Wi-Fi, run by run."""
+    return np.asarray(errors_m < np.minimum(odometry_m, wifi_m) - CLEARLY_M)
+
+
+class Spread(NamedTuple):
+    """Median over seeds, and the interval that holds 90 % of them; infinite where that many runs had no answer."""
+
+    median: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, values: Floats) -> Spread:
+        """Of one number per seed, (n,)."""
+        return cls(*(quantile(values, share) for share in (0.5, 0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0)))
+
+
+class Share(NamedTuple):
+    """How often something held, with the 90 % interval of the probability behind it (Wilson 1927)."""
+
+    held: int
+    total: int
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, held: NDArray[np.bool_]) -> Share:
+        """Of one answer per seed, (n,)."""
+        from scipy.stats import binomtest
+
+        interval = binomtest(int(held.sum()), held.size).proportion_ci(LEVEL, method="wilson")
+        return cls(int(held.sum()), held.size, float(interval.low), float(interval.high))
+
+    @property
+    def value(self) -> float:
+        """As a fraction."""
+        return self.held / self.total

@@ -1,0 +1,106 @@
+"""One run of one environment: what every lane, every reading and every origin makes of it, as small arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import fusion
+from benchmarks.instants import Floats, evaluation_instants, match
+from benchmarks.lane import Lane, run_lane
+from benchmarks.paper.moves import measured_moves
+from benchmarks.paper.published import EKF, ODOMETRY, PROPOSED, WIFI
+from benchmarks.paper.readings import MISSING_OPTION, MISSING_VALUES, ORIGINS_M, READINGS, SCALE_OPTION, SCALES
+from benchmarks.paper.variants import leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
+from fusion import Decision, Update, WifiScan
+from logs.run import Run
+from sensors.scenario import Scenario, load_scenario
+from sensors.simulate import simulated_run
+
+GYRO = " + gyro"
+GYRO_LANES = (ODOMETRY, PROPOSED, "bayes_weight", EKF)
+"""Estimators that are also run on the turns of a gyro: the paper's future work, and the best filter beside it."""
+
+
+class Trial(NamedTuple):
+    """All results of one run [m]: errors (points, 2) by lane, infinite without a valid answer; whether the proposed
+    method took a fix for an outlier, (points,); its largest error by reading, by what missing Wi-Fi counts, by origin;
+    straight moves as its odometry measures them; why a lane crashed, by lane.
+    """
+
+    errors: Mapping[str, Floats]
+    refused: NDArray[np.bool_]
+    readings: Floats
+    missing: Floats
+    origins: Floats
+    moves: Floats
+    crashes: Mapping[str, str]
+
+
+def largest(errors: Floats) -> float:
+    """The largest absolute coordinate error [m] of (points, 2)."""
+    return float(np.abs(errors).max())
+
+
+def point_errors(run: Run, updates: Iterable[Update]) -> Floats:
+    """Estimate minus truth where the truth was surveyed, (points, 2) [m], infinite without a valid answer."""
+    assert run.truth is not None
+    instants = evaluation_instants(run.truth)
+    answers = match(instants, tuple(updates))
+    away = np.stack([answers.x - instants.x, answers.y - instants.y], axis=1)
+    return np.where(answers.valid[:, None], away, np.inf)
+
+
+def lane_errors(run: Run, lane: Lane) -> Floats:
+    """`point_errors` of a lane; one that crashed gave no answer at all."""
+    return point_errors(run, () if lane.error else lane.updates)
+
+
+@lru_cache(maxsize=8)
+def _scenario(place: str | Path) -> Scenario:
+    return load_scenario(place)
+
+
+def run_trial(task: tuple[str | Path, int]) -> Trial:
+    """Of a scenario, built in or a file, and a seed: a pure function of both and of the installed estimators."""
+    place, seed = task
+    scenario = _scenario(place)
+    whole = simulated_run(scenario, seed)
+    plain, aided = without_gyro(whole), with_gyro(whole, scenario.reality)
+    lanes = {name: (plain, run_lane(plain, name, seed=seed)) for name in fusion.names()}
+    lanes |= {name + GYRO: (aided, run_lane(aided, name, seed=seed)) for name in GYRO_LANES}
+    brief = leg_by_leg(plain)
+    return Trial(
+        {name: lane_errors(*lane) for name, lane in lanes.items()},
+        _refused(lanes[PROPOSED][1]),
+        np.array([proposed_largest(brief, reading.options) for reading in READINGS]),
+        np.array([proposed_largest(missing_wifi(brief, seed), {MISSING_OPTION: value}) for value in MISSING_VALUES]),
+        np.array([proposed_largest(moved_by(brief, offset_m)) for offset_m in ORIGINS_M]),
+        measured_moves(scenario, seed),
+        {name: lane.error for name, (_, lane) in lanes.items() if lane.error is not None},
+    )
+
+
+def run_alternative(task: tuple[Scenario, int]) -> Mapping[str, float]:
+    """The largest error [m] in another filling: odometry, Wi-Fi, EKF, and the proposed method by outlier scale."""
+    scenario, seed = task
+    brief = leg_by_leg(without_gyro(simulated_run(scenario, seed)))
+    alone = {name: largest(lane_errors(brief, run_lane(brief, name, seed=seed))) for name in (ODOMETRY, WIFI, EKF)}
+    return alone | {scale: proposed_largest(brief, {SCALE_OPTION: scale}) for scale in SCALES}
+
+
+def proposed_largest(run: Run, options: Mapping[str, object] | None = None) -> float:
+    """The largest error [m] of the proposed method, read as ``options`` say."""
+    assert run.prior is not None
+    estimator = fusion.load(PROPOSED)(run.world, **(options or {}))
+    return largest(point_errors(run, fusion.track(estimator, run.world, run.measurements, run.prior)))
+
+
+def _refused(lane: Lane) -> NDArray[np.bool_]:
+    scans = [update for update in lane.final if isinstance(update.measurement, WifiScan)]
+    return np.array([any(fate.decision is Decision.REJECTED for fate in scan.fates) for scan in scans])

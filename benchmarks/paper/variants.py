@@ -1,0 +1,106 @@
+"""One run told in other ways: with its gyro, leg by leg, with another origin, with scans that miss an access point."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fusion import Gyro, Increment, Measurement, Odometry, Pose, WifiScan, World
+from fusion.odometry import Odometer
+from logs.run import Run
+from sensors.scenario import Reality
+
+MISSING_SHARE = 0.2
+"""How often a scan lacks one access point, in the variant with missing Wi-Fi."""
+
+
+def without_gyro(run: Run) -> Run:
+    """The run of a robot that has none, as the paper's."""
+    return replace(run, measurements=tuple(item for item in run.measurements if not isinstance(item, Gyro)))
+
+
+def with_gyro(run: Run, reality: Reality) -> Run:
+    """The run of a robot that takes its turns from the gyro, and is told how good that is."""
+    table: dict[str, Any] = json.loads(run.world.table)
+    table["robot"]["turn_source"] = "gyro"
+    table["robot"]["noise"] |= {
+        "turn_std_per_sqrt_rad": 0.0,
+        "turn_std_per_sqrt_m": 0.0,
+        "turn_std_per_sqrt_s": reality.gyro_noise_std_rad_s / math.sqrt(reality.gyro_hz),
+        "turn_scale_std": 0.0,
+        "turn_bias_std_rad_s": reality.gyro_bias_std_rad_s,
+    }
+    return replace(run, world=World.from_table(table))
+
+
+def leg_by_leg(run: Run) -> Run:
+    """The same motion in three increments per scan: turn, go straight, turn.
+
+    For a method that only adds poses this is the same run to rounding, where the robot drives straight between scans
+    even to the distance travelled; it is some fifty times shorter.
+    """
+    assert run.prior is not None
+    odometer, told = Odometer(run.world.robot), list[Measurement]()
+    state, motion, since_ns = odometer.start(run.prior.time_ns), Increment(), run.prior.time_ns
+    for measurement in run.measurements:
+        state, seen = odometer.advance(state, measurement)
+        for item in seen:
+            if isinstance(item, Odometry):
+                motion = motion.extend(item, run.world.robot.noise)
+            elif isinstance(item, WifiScan):
+                told += [*_leg(motion, since_ns, item.time_ns), item]
+                motion, since_ns = Increment(), item.time_ns
+    return replace(run, measurements=tuple(told))
+
+
+def _leg(motion: Increment, from_ns: int, until_ns: int) -> list[Odometry]:
+    first = math.atan2(motion.y, motion.x) if (motion.x, motion.y) != (0.0, 0.0) else 0.0
+    parts = ((0.0, first), (math.hypot(motion.x, motion.y), 0.0), (0.0, motion.heading - first))
+    times = [from_ns + (until_ns - from_ns) * i // 3 for i in range(4)]
+    return [Odometry(times[i + 1], "wheels", i, times[i], distance, turn) for i, (distance, turn) in enumerate(parts)]
+
+
+def moved_by(run: Run, offset_m: float | None) -> Run:
+    """`moved` along both axes alike; None: until the middle of the floor is the origin."""
+    bounds = run.world.bounds
+    if offset_m is None:
+        return moved(run, -0.5 * (bounds.x_min + bounds.x_max), -0.5 * (bounds.y_min + bounds.y_max))
+    return moved(run, offset_m, offset_m)
+
+
+def moved(run: Run, x: float, y: float) -> Run:
+    """The same run in a map whose origin lies elsewhere: (``x``, ``y``) [m] is added to every coordinate."""
+    assert run.truth is not None
+    assert run.prior is not None
+    table: dict[str, Any] = json.loads(run.world.table)
+    for anchor in table["anchors"]:
+        anchor["position_m"] = [anchor["position_m"][0] + x, anchor["position_m"][1] + y, *anchor["position_m"][2:]]
+    for key in table["bounds"]:
+        table["bounds"][key] += x if key.startswith("x") else y
+    table["walls"] = [[[a + x, b + y] for a, b in wall] for wall in table["walls"]]
+    pose = run.prior.pose
+    return replace(
+        run,
+        world=World.from_table(table),
+        prior=replace(run.prior, pose=Pose(pose.x + x, pose.y + y, pose.heading)),
+        truth=replace(run.truth, x=run.truth.x + x, y=run.truth.y + y),
+    )
+
+
+def missing_wifi(run: Run, seed: int) -> Run:
+    """The run with one access point, drawn at random, missing from a fifth of the scans: those give no fix."""
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
+
+    def damaged(measurement: Measurement) -> Measurement:
+        if not isinstance(measurement, WifiScan):
+            return measurement
+        lost, which = random.random(), int(random.integers(len(measurement.readings)))
+        if lost >= MISSING_SHARE:
+            return measurement
+        return replace(measurement, readings=measurement.readings[:which] + measurement.readings[which + 1 :])
+
+    return replace(run, measurements=tuple(map(damaged, run.measurements)))

@@ -1,0 +1,164 @@
+"""Claims and verdicts on outcomes made by hand: each claim is kept by some runs and broken by others."""
+
+import numpy as np
+import pytest
+
+from benchmarks.paper import evidence
+from benchmarks.paper.claims import CLAIMS, judge, verdict
+from benchmarks.paper.experiment import Outcome
+from benchmarks.paper.moves import MOVES_M
+from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
+from benchmarks.paper.readings import MISSING_VALUES, ORIGINS_M, READINGS
+from benchmarks.paper.study import effects, literal_of_scale, rank
+from benchmarks.paper.summary import Share, Spread
+from sensors.scenario import load_scenario
+
+OFFICE, MEC, ARENA = ENVIRONMENTS
+
+
+def outcome(odometry, wifi, proposed, environment=OFFICE, **more):
+    """Errors along x alone, (runs, points) [m] each."""
+    curves = {ODOMETRY: odometry, WIFI: wifi, PROPOSED: proposed}
+    errors = {
+        lane: np.stack([np.array(rows, float), np.zeros_like(rows, float)], axis=2) for lane, rows in curves.items()
+    }
+    n, p, _ = errors[PROPOSED].shape
+    parts = {
+        "refused": np.zeros((n, p), bool),
+        "readings": np.tile(errors[PROPOSED].max(axis=(1, 2))[:, None], (1, len(READINGS))),
+        "missing": np.ones((n, len(MISSING_VALUES))),
+        "origins": np.ones((n, len(ORIGINS_M))),
+        "moves": np.tile(np.array(MOVES_M) * 1.02, (n, 1)),
+        "alternatives": {},
+        "bound": np.tile(np.eye(2), (p, 1, 1)),
+        "crashes": {},
+    }
+    return Outcome(environment, load_scenario(environment.scenario), tuple(range(n)), errors, **(parts | more))
+
+
+ONE = [[0.1, 0.1, 0.2]]
+
+
+@pytest.mark.parametrize(
+    ("proposed", "better", "halves_larger", "halves_both"),
+    [(0.9, True, False, False), (1.0, False, False, False), (0.5, True, True, True), (0.75, True, True, False)],
+)
+def test_better_and_half_are_of_the_largest_errors(proposed, better, halves_larger, halves_both):
+    """Odometry errs 1 m at most, Wi-Fi 1.6 m."""
+    found = outcome([[0.2, 1.0]], [[1.6, 0.1]], [[proposed, 0.0]])
+    assert evidence.beats_both(found).tolist() == [better]
+    assert evidence.halves_larger(found).tolist() == [halves_larger]
+    assert evidence.halves_both(found).tolist() == [halves_both]
+
+
+def test_a_method_that_refused_every_fix_does_not_beat_odometry_by_rounding():
+    assert evidence.beats_both(outcome([[0.2]], [[0.9]], [[0.2 - 1e-12]])).tolist() == [False]
+
+
+def test_the_larger_coordinate_counts_not_the_distance():
+    found = outcome(ONE, ONE, ONE)
+    found.errors[PROPOSED][0, 1] = (0.3, -0.4)
+    assert found.largest(PROPOSED).tolist() == [0.4]
+    assert found.coordinate(PROPOSED)[0].tolist() == [0.1, 0.4, 0.2]
+    assert found.euclidean(PROPOSED)[0].tolist() == pytest.approx([0.1, 0.5, 0.2])
+
+
+@pytest.mark.parametrize(("largest", "kept"), [(0.05, True), (0.0501, False)])
+def test_published_maximum_may_be_reached(largest, kept):
+    assert evidence.within_maximum(outcome(ONE, ONE, [[0.0, largest]])).tolist() == [kept]
+
+
+@pytest.mark.parametrize(
+    ("errors", "paper", "fingerprints"),
+    [
+        ([0.1, 0.8], False, True),  # mean 0.45
+        ([0.1, 0.5], True, True),  # mean 0.3
+        ([0.0, 0.0, 0.9], False, True),  # mean 0.3, maximum 0.9
+        ([0.2, 1.2], False, True),  # mean 0.7
+        ([0.0, 0.0, 1.7], False, False),
+    ],
+)
+def test_table_1_needs_mean_and_maximum(errors, paper, fingerprints):
+    found = outcome([errors], [errors], [errors], ARENA)
+    assert evidence.within_table_1(found).tolist() == [paper]
+    assert evidence.as_good_as_fingerprints(found).tolist() == [fingerprints]
+
+
+@pytest.mark.parametrize(("largest", "kept"), [(0.31, True), (0.29, False)])
+def test_an_outlier_is_three_times_the_median(largest, kept):
+    assert evidence.has_wifi_outliers(outcome(ONE, [[0.1, 0.1, largest]], ONE)).tolist() == [kept]
+
+
+@pytest.mark.parametrize(("last", "kept"), [(0.4, True), (0.39, False)])
+def test_growth_compares_the_last_third_with_the_first(last, kept):
+    """Seven points: two in each outer third."""
+    errors = [[0.1, 0.3, 9.0, 9.0, 9.0, last, 0.4]]
+    assert evidence.odometry_grows(outcome(errors, errors, errors)).tolist() == [kept]
+
+
+def test_moves_on_a_line_are_linear_and_scattered_ones_are_not():
+    assert evidence.is_linear(outcome(ONE, ONE, ONE)).tolist() == [True]
+    scattered = np.array([MOVES_M]) + np.tile([0.3, -0.3], len(MOVES_M) // 2)
+    assert evidence.is_linear(outcome(ONE, ONE, ONE, moves=scattered)).tolist() == [False]
+
+
+def test_refusals_are_weighed_against_what_was_refused():
+    """Fixes: better and refused, worse and refused, better and taken, worse and taken."""
+    found = outcome([[0.5, 0.5, 0.5, 0.5]], [[0.1, 0.9, 0.1, 0.9]], [[0.5, 0.5, 0.3, 0.7]])
+    found = found._replace(refused=np.array([[True, True, False, False]]))
+    assert evidence.refused_share(found) == 0.5
+    assert evidence.refused_though_better(found) == 0.5
+    assert evidence.taken_though_worse(found) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("shares", "expected"),
+    [
+        pytest.param([(100, 100), (99, 100)], "reproduced", id="nearly always everywhere"),
+        pytest.param([(0, 100), (1, 100)], "not reproduced", id="nearly never everywhere"),
+        pytest.param([(0, 100), (100, 100)], "reproduced in 50 %", id="always here, never there"),
+        pytest.param([(90, 100), (90, 100)], "reproduced in 90 %", id="the interval reaches below 90 %"),
+        pytest.param([(0, 24), (0, 100)], "cannot tell from 24 runs", id="too few runs in one environment"),
+        pytest.param([(0, 25)], "not reproduced", id="just enough"),
+    ],
+)
+def test_verdict(shares, expected):
+    assert verdict([Share.of(np.arange(total) < held) for held, total in shares]) == expected
+
+
+def test_every_claim_is_judged_on_its_environments_with_a_reason():
+    made = [outcome(*[[[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]] * 30] * 3, environment) for environment in ENVIRONMENTS]
+    judged = judge(made)
+    assert [each.claim for each in judged] == list(CLAIMS)
+    assert all(each.reason.endswith(".") for each in judged)
+    about = {each.claim.key: set(each.shares) for each in judged}
+    assert about.pop("table_1") == about.pop("fingerprints") == {ARENA.title}
+    assert all(titles == {each.title for each in ENVIRONMENTS} for titles in about.values())
+
+
+def test_spread_counts_runs_without_an_answer_as_infinite():
+    assert Spread.of(np.array([1.0, 2.0, 3.0, np.inf])) == (2.5, pytest.approx(1.15), np.inf)
+
+
+def test_readings_are_ranked_by_how_far_they_are_from_the_paper():
+    """One reading hits every published maximum, one is twice as far everywhere, the others ten times."""
+    exact, twice = 17, literal_of_scale("floor")
+    made = []
+    for environment in ENVIRONMENTS:
+        readings = np.full((3, len(READINGS)), 10.0 * environment.proposed_max_m)
+        readings[:, exact], readings[:, twice] = environment.proposed_max_m, environment.proposed_max_m / 2.0
+        made.append(outcome(*[[[0.1]] * 3] * 3, environment, readings=readings))
+    ranked = rank(made)
+    assert [each.reading for each in ranked[:2]] == [READINGS[exact], READINGS[twice]]
+    assert [each.factor for each in ranked[:3]] == pytest.approx([1.0, 2.0, 10.0])
+
+
+def test_effect_of_an_option_is_the_geometric_mean_over_all_others():
+    """Feedback alone decides: 2 m with, 8 m without."""
+    row = [2.0 if reading.options["feedback"] else 8.0 for reading in READINGS]
+    made = [outcome(*[[[0.1]] * 3] * 3, environment, readings=np.array([row] * 3)) for environment in ENVIRONMENTS]
+    found = {effect.option: effect for effect in effects(made)}
+    assert found["feedback"].medians_m == {"True": pytest.approx((2.0,) * 3), "False": pytest.approx((8.0,) * 3)}
+    assert found["feedback"].ratio == pytest.approx((4.0,) * 3)
+    assert found["epsilon"].ratio == pytest.approx((1.0,) * 3)
+    assert found["epsilon"].medians_m["3"] == pytest.approx((4.0,) * 3)

@@ -1,0 +1,195 @@
+"""`fusion reproduce` on a few runs: the same bytes for the same seed, nothing judged on what it was calibrated on."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import fusion
+from benchmarks.instants import evaluation_instants, match
+from benchmarks.lane import run_lane
+from benchmarks.paper import reproduce as module
+from benchmarks.paper.calibrate import SEEDS
+from benchmarks.paper.experiment import run_experiments
+from benchmarks.paper.figures import FIGURES
+from benchmarks.paper.page import markdown
+from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
+from benchmarks.paper.readings import ORIGINS_M, READINGS, literal
+from benchmarks.paper.reproduce import reproduce
+from benchmarks.paper.trial import GYRO, GYRO_LANES, run_alternative, run_trial
+from benchmarks.paper.variants import with_gyro
+from benchmarks.score import errors
+from benchmarks.sheet import as_markdown
+from fusion import ParameterError, WorldError
+from fusion.cli import main
+from sensors.scenario import load_scenario
+from sensors.simulate import simulated_run
+
+
+@pytest.fixture(scope="module")
+def report():
+    return reproduce(2, seed=5, workers=1)
+
+
+def record(report):
+    return json.dumps(report.record(), allow_nan=False)
+
+
+def test_workers_change_nothing(report):
+    seen = []
+    again = reproduce(2, seed=5, workers=2, progress=lambda done, total, what: seen.append((done, total)))
+    assert record(again) == record(report)
+    assert seen == [(done, len(seen)) for done in range(1, len(seen) + 1)]
+
+
+def test_a_seed_gives_its_run_whichever_is_the_first(report):
+    (alone, *_) = run_experiments(1, seed=6)
+    both = report.outcomes[0]
+    assert alone.seeds == (6,)
+    assert all(np.array_equal(alone.errors[lane][0], both.errors[lane][1]) for lane in both.errors)
+
+
+def test_every_estimator_runs_on_the_same_runs_and_some_on_a_gyro(report):
+    for outcome in report.outcomes:
+        assert set(outcome.errors) == {*fusion.names(), *(name + GYRO for name in GYRO_LANES)}
+        assert {e.shape for e in outcome.errors.values()} == {(2, outcome.environment.trial_points, 2)}
+        assert not outcome.crashes
+
+
+def test_literal_reading_and_unmoved_origin_are_the_proposed_lane_itself(report):
+    for outcome in report.outcomes:
+        own = outcome.largest(PROPOSED)
+        assert outcome.readings[:, READINGS.index(literal())] == pytest.approx(own, abs=1e-6)
+        assert outcome.origins[:, ORIGINS_M.index(0.0)] == pytest.approx(own, abs=1e-6)
+
+
+def test_what_is_refused_leaves_the_answer_where_odometry_had_it(report):
+    """Until the first fix is taken, the proposed method is dead reckoning; there it differs."""
+    for outcome in report.outcomes:
+        for refused, proposed, odometry in zip(
+            outcome.refused, outcome.errors[PROPOSED], outcome.errors[ODOMETRY], strict=True
+        ):
+            first = int(np.argmin(refused)) if not refused.all() else len(refused)
+            assert proposed[:first] == pytest.approx(odometry[:first], abs=1e-9)
+            assert not np.allclose(proposed[first : first + 1], odometry[first : first + 1]) or first == len(refused)
+
+
+def test_alternative_of_the_main_scenario_is_the_trial_itself():
+    scenario = load_scenario("paper_mec")
+    brief, whole = run_alternative((scenario, 8)), run_trial(("paper_mec", 8))
+    for lane in (ODOMETRY, WIFI):
+        assert brief[lane] == pytest.approx(np.abs(whole.errors[lane]).max(), abs=1e-6)
+    assert brief["coordinate"] == pytest.approx(np.abs(whole.errors[PROPOSED]).max(), abs=1e-6)
+
+
+def test_estimator_that_crashes_costs_its_own_lane_and_is_told(monkeypatch):
+    class Broken:
+        summary, tags = "breaks", frozenset()
+
+        def __init__(self, world):
+            pass
+
+        def start(self, prior, seed):
+            raise ZeroDivisionError
+
+        def step(self, state, measurement):
+            return state, ()
+
+        def estimate(self, state, time_ns):
+            raise NotImplementedError
+
+    with fusion.registered("broken", Broken):
+        trial = run_trial(("paper_office", 0))
+    assert "ZeroDivisionError" in trial.crashes["broken"]
+    assert np.isinf(trial.errors["broken"]).all()
+    assert np.isfinite(trial.errors["ekf"]).all()
+
+
+@pytest.mark.parametrize("seed", [SEEDS.start, SEEDS.stop - 1, SEEDS.start - 1])
+def test_seeds_of_the_calibration_are_refused(seed):
+    with pytest.raises(ParameterError, match="calibrated on; choose another --seed"):
+        reproduce(2, seed=seed)
+
+
+@pytest.mark.parametrize(("trials", "seed"), [(0, 0), (1, -1)])
+def test_trials_or_seeds_without_a_meaning_are_refused(trials, seed):
+    with pytest.raises(ParameterError, match="trials from seed"):
+        reproduce(trials, seed=seed)
+
+
+def test_missing_scenarios_are_told(tmp_path):
+    with pytest.raises(WorldError, match=r"alternatives\.toml: no numbers .*--calibrate"):
+        reproduce(1, scenarios=tmp_path)
+
+
+def test_gyro_turns_are_nearer_the_truth_than_wheel_turns():
+    """On the arena's lap of 18 turns, the heading that dead reckoning ends with; median of 8 runs."""
+    scenario, wheels, gyro = load_scenario("paper_arena"), [], []
+    for seed in range(8):
+        run = simulated_run(scenario, seed)
+        for told, into in ((run, wheels), (with_gyro(run, scenario.reality), gyro)):
+            instants = evaluation_instants(told.truth)
+            into.append(errors(instants, match(instants, run_lane(told, ODOMETRY).updates)).heading[-1])
+    assert np.median(gyro) < 0.5 * np.median(wheels)
+
+
+def test_page_has_every_table_and_figure_and_leaves_no_place_open(report):
+    text = markdown(report, lambda name: f"{name}.png")
+    assert "{{" not in text
+    assert all(as_markdown(sheet) in text for sheet in report.sheets.values())
+    assert all(f"]({name}.png)" in text for name in FIGURES)
+    assert "cannot tell from 2 runs" in text
+
+
+def test_command_prints_tables_and_writes_what_is_asked(report, tmp_path, monkeypatch, capsys):
+    asked = {}
+
+    def held(trials, **more):
+        asked.update(more, trials=trials)
+        return report
+
+    monkeypatch.setattr(module, "reproduce", held)
+    files = {kind: tmp_path / f"paper.{kind}" for kind in ("json", "html", "png")}
+    page = tmp_path / "docs" / "paper.md"
+    words = [word for kind, path in files.items() for word in (f"--{kind}", str(path))]
+    assert main(["reproduce", "--trials", "2", "--seed", "5", *words, "--markdown", str(page)]) == 0
+    assert (asked["trials"], asked["seed"]) == (2, 5)
+    out = capsys.readouterr().out
+    for sheet in report.sheets.values():
+        assert sheet.title.split(":")[0] in out
+    assert json.loads(files["json"].read_text()) == report.record()
+    assert files["png"].read_bytes().startswith(b"\x89PNG")
+    assert {path.name for path in page.parent.iterdir()} == {"paper.md", *(f"paper-{name}.png" for name in FIGURES)}
+    html = files["html"].read_text()
+    assert html.count("data:image/png;base64,") == len(FIGURES)
+    assert not re.search(r'(src|href)="(?!data:)', html)
+    assert html.count("<table>") == html.count("</table>") > len(report.sheets)
+
+
+def test_file_that_cannot_be_written_is_told(report, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(module, "reproduce", lambda *_, **__: report)
+    assert main(["reproduce", "--json", str(tmp_path)]) == 1
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_calibrate_writes_scenarios_and_does_nothing_else(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(module, "write_calibrated", lambda folder, **_: [folder / "paper_office.toml"])
+    assert main(["reproduce", "--calibrate", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'paper_office.toml'}\n"
+
+
+@pytest.mark.parametrize("words", [["--trials", "0"], ["--trials", "x"], ["--workers", "0"], ["--trails", "3"]])
+def test_wrong_words_are_wrong_usage(words, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["reproduce", *words])
+    assert stop.value.code == 2
+
+
+def test_published_numbers_are_those_of_the_three_environments():
+    assert [(e.path_loss_exponent, e.trial_points) for e in ENVIRONMENTS] == [(2.27, 7), (2.13, 12), (1.71, 18)]
+    assert [tuple(e.maxima_m.values()) for e in ENVIRONMENTS] == [
+        (0.24, 0.82, 0.05),
+        (1.68, 0.86, 0.53),
+        (1.75, 4.52, 0.8),
+    ]
