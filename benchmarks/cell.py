@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import platform
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -20,7 +19,6 @@ import fusion
 from benchmarks.instants import evaluation_instants, match
 from benchmarks.lane import Lane, run_lane
 from benchmarks.score import Errors, errors, metrics
-from fusion import Decision, Estimate
 from logs.reader import read_run
 from logs.run import Run
 
@@ -103,25 +101,19 @@ def _errors(run: Run, lane: Lane) -> Errors | None:
     instants = evaluation_instants(run.truth)
     if len(instants.time_ns) == 0:
         return None
-    return errors(instants, match(instants, () if lane.error else lane.updates))
+    return errors(instants, match(instants, lane.track))
 
 
 def _status(lane: Lane, measured: Errors | None) -> str:
     if lane.error is not None:
         return "crashed"
-    if not all(_is_sound(update.estimate) for update in lane.updates):
+    if not lane.track.is_sound:
         return "diverged"
     if measured is None:
         return "unscored"
     available = float(np.isfinite(measured.position).mean())
     # Fewer than half of the answers valid is also what makes the median infinite.
     return "diverged" if available < LEAST_AVAILABILITY or not math.isfinite(metrics(measured)["pos_p50"]) else "ok"
-
-
-def _is_sound(estimate: Estimate) -> bool:
-    """What an estimator does not claim, a position not valid or a heading not known, may be any number."""
-    x, y, heading = map(math.isfinite, estimate.pose)
-    return not estimate.valid or (x and y and (heading or not estimate.heading_known))
 
 
 def _facts(cell: Cell, run: Run) -> dict[str, object]:
@@ -141,13 +133,10 @@ def _cost(run: Run, lane: Lane) -> dict[str, object]:
     """What needs no truth: digest, processor time, fates and the mean NIS of the last word on each measurement."""
     if lane.error is not None:
         return {}
-    fates = [fate for update in lane.final for fate in update.fates]
-    decisions = Counter(fate.decision for fate in fates)
-    nis = [fate.nis for fate in fates if fate.nis is not None]
     return {
         "digest": lane.digest,
         "cpu_s": lane.cpu_s,
         "cpu_per_measurement_s": lane.cpu_s / len(run.measurements) if run.measurements else None,
-        "fates": {decision.value: decisions[decision] for decision in Decision},
-        "nis_mean": float(np.mean(nis)) if nis and np.isfinite(nis).all() else None,
+        "fates": lane.fates.counts,
+        "nis_mean": lane.fates.nis_mean,
     }

@@ -7,13 +7,12 @@ held constant, and one that is too old counts as none at all.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fusion import Covariance, Reason, Update
+from benchmarks.track import Floats, Stamps, Track
 from fusion.values import nanoseconds
 from logs.run import TruthTrack
 
@@ -23,9 +22,6 @@ GAP_S = 0.5
 """Across a longer gap the truth is not interpolated."""
 MAX_AGE_S = 1.0
 """An older estimate counts as none."""
-
-Floats = NDArray[np.float64]
-Stamps = NDArray[np.int64]
 
 
 class Instants(NamedTuple):
@@ -94,52 +90,29 @@ def _resampled(known: Instants, time_ns: Stamps, gap_ns: int) -> Instants:
     return Instants(*(column[kept] for column in resampled))
 
 
-def reception_ns(updates: Sequence[Update]) -> Stamps:
-    """When each update was there, (m,): the newest stamp among the messages received by then.
-
-    Updates stand in the order of arrival, so this never decreases. A message whose own clock was refused says
-    nothing about the time.
-    """
-    clocks = [np.iinfo(np.int64).min if _is_bad_clock(update) else update.measurement.time_ns for update in updates]
-    return np.maximum.accumulate(np.array(clocks, dtype=np.int64))
-
-
-def _is_bad_clock(update: Update) -> bool:
-    return bool(update.fates) and update.fates[0].reason is Reason.BAD_CLOCK
-
-
-def match(instants: Instants, updates: Sequence[Update], *, max_age_s: float = MAX_AGE_S) -> Answers:
+def match(instants: Instants, track: Track, *, max_age_s: float = MAX_AGE_S) -> Answers:
     """For each instant the newest estimate received by then; of two with one stamp, the later received.
 
     Valid when the estimator says so, its position is finite and ``instant - stamp <= max_age_s`` in whole nanoseconds.
     """
-    if not updates:
+    if len(track.stamp_ns) == 0:
         return _no_answers(len(instants.time_ns))
-    stamp_ns = np.array([update.estimate.time_ns for update in updates], dtype=np.int64)
-    rising = stamp_ns >= np.maximum.accumulate(stamp_ns)
-    newest = np.maximum.accumulate(np.where(rising, np.arange(len(updates)), 0))
-    received = np.searchsorted(reception_ns(updates), instants.time_ns, side="right") - 1
+    rising = track.stamp_ns >= np.maximum.accumulate(track.stamp_ns)
+    newest = np.maximum.accumulate(np.where(rising, np.arange(len(rising)), 0))
+    received = np.searchsorted(track.received_ns, instants.time_ns, side="right") - 1
     chosen = newest[np.maximum(received, 0)]
-    fresh = (received >= 0) & (instants.time_ns - stamp_ns[chosen] <= nanoseconds(max_age_s))
-    return _answers([updates[i] for i in chosen], fresh)
+    fresh = (received >= 0) & (instants.time_ns - track.stamp_ns[chosen] <= nanoseconds(max_age_s))
+    x, y, heading = track.pose[chosen].T
+    known = track.heading_known[chosen] & np.isfinite(heading)
+    return Answers(
+        fresh & track.valid[chosen] & np.isfinite(x) & np.isfinite(y),
+        x,
+        y,
+        np.where(known, heading, np.nan),
+        track.covariance_matrices[chosen],
+    )
 
 
 def _no_answers(count: int) -> Answers:
     unknown = np.full(count, np.nan)
     return Answers(np.zeros(count, dtype=bool), unknown, unknown, unknown, np.full((count, 3, 3), np.nan))
-
-
-def _answers(chosen: Sequence[Update], fresh: NDArray[np.bool_]) -> Answers:
-    estimates = [update.estimate for update in chosen]
-    pose = np.array([estimate.pose for estimate in estimates], dtype=np.float64).reshape(-1, 3)
-    none = np.full((3, 3), np.nan)
-    covariance = [none if e.covariance is None else Covariance(*e.covariance).matrix for e in estimates]
-    claimed = np.array([estimate.valid for estimate in estimates], dtype=bool)
-    heading_known = np.array([estimate.heading_known for estimate in estimates], dtype=bool)
-    return Answers(
-        fresh & claimed & np.isfinite(pose[:, 0]) & np.isfinite(pose[:, 1]),
-        pose[:, 0],
-        pose[:, 1],
-        np.where(heading_known & np.isfinite(pose[:, 2]), pose[:, 2], np.nan),
-        np.array(covariance, dtype=np.float64).reshape(-1, 3, 3),
-    )

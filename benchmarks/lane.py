@@ -9,6 +9,7 @@ from functools import cached_property
 
 import fusion
 from benchmarks.prior import starting_prior
+from benchmarks.track import FateColumns, Track
 from fusion import FusionError, Update
 from logs.run import Run
 
@@ -32,6 +33,16 @@ class Lane:
     def final(self) -> tuple[Update, ...]:
         """The last word on each measurement, in time order."""
         return tuple(fusion.final(self.updates))
+
+    @cached_property
+    def track(self) -> Track:
+        """All updates as columns; of an estimator that crashed none, for half a run is not a result."""
+        return Track.of(() if self.error else self.updates)
+
+    @cached_property
+    def fates(self) -> FateColumns:
+        """The last word on every reading, as columns."""
+        return FateColumns.of([fate for update in self.final for fate in update.fates])
 
 
 def run_lane(run: Run, estimator: str, options: Mapping[str, object] | None = None, seed: int = 0) -> Lane:

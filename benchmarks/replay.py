@@ -11,7 +11,6 @@ from pathlib import Path
 
 import fusion
 from benchmarks.bench import parse_value
-from benchmarks.instants import reception_ns
 from benchmarks.lane import Lane, run_lane
 from fusion import LogError, ParameterError, PluginError, Truth
 from logs.reader import read_run
@@ -64,7 +63,7 @@ def _write(run: Run, lane: Lane, output: Path, metadata: Mapping[str, str]) -> N
     """Messages in the order they came in, each followed by what the estimator said to it."""
     truths = _truths(run.truth) if run.truth is not None else []
     with RunWriter(output, run.world, name=run.name, prior=run.prior, metadata=metadata) as writer:
-        for update, received_ns in zip(lane.updates, reception_ns(lane.updates).tolist(), strict=True):
+        for update, received_ns in zip(lane.updates, lane.track.received_ns.tolist(), strict=True):
             while truths and truths[-1].time_ns <= received_ns:
                 writer.write_truth(truths.pop())
             # The host answers every message with one update of its own; those after it are revisions.

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.instants import Answers, Floats, Instants, wrap_angles
+from benchmarks.instants import Answers, Instants, wrap_angles
+from benchmarks.track import Floats
 
 AUC_RADIUS_M = 3.0
 CHI_SQUARE_95 = {2: 5.991464547107979, 3: 7.814727903251179}

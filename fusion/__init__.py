@@ -12,6 +12,7 @@ from fusion.errors import (
     ParameterError,
     PluginError,
     RecordingError,
+    SuiteError,
     ViewerError,
     WorldError,
 )
@@ -71,6 +72,7 @@ __all__ = [
     "Robot",
     "RssiReading",
     "Sighting",
+    "SuiteError",
     "Tag",
     "Tracker",
     "Truth",

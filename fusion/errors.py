@@ -7,6 +7,7 @@
     ├── MeasurementError  a measurement breaks the contract                → fix the driver or the log
     ├── LogError          a file cannot be read as a run                   → repair it, or give another file
     ├── RecordingError    a foreign recording cannot be imported           → compare the folder with the docs
+    ├── SuiteError        a suite of benchmarks contradicts itself         → edit the suite file
     ├── ConformanceError  an estimator breaks a promise of the contract    → fix the estimator
     └── ViewerError       the Rerun viewer cannot be used here             → install what the message names
 
@@ -44,6 +45,10 @@ class LogError(FusionError):
 
 class RecordingError(FusionError):
     """A foreign recording cannot be imported."""
+
+
+class SuiteError(FusionError):
+    """A suite of benchmarks is incomplete or contradicts itself."""
 
 
 class ConformanceError(FusionError):

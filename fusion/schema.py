@@ -1,7 +1,7 @@
 """Tables of names and values into frozen dataclasses, refusing what was not asked for.
 
-Used for the world file. Unknown keys are answered with their nearest match, numbers must be finite, and every
-message names the place (``anchors[2].radio``).
+Used for world, scenario and suite files. Unknown keys are answered with their nearest match, numbers must be finite,
+and every message names the place (``anchors[2].radio``).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import dataclasses
 import math
 import sys
 import types
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from fusion.errors import WorldError, did_you_mean
@@ -43,12 +43,18 @@ def _is_required(field: dataclasses.Field[Any]) -> bool:
 
 
 def read_value(kind: Any, value: object, where: str) -> Any:  # noqa: ANN401 - a value of whatever type is asked for
-    """``value`` as ``kind``: a number, string, bool, tuple or nested dataclass."""
+    """``value`` as ``kind``: a number, string, bool, tuple, table or nested dataclass; ``object`` takes anything."""
+    if kind is object:
+        return value
     if isinstance(kind, types.UnionType):
         kinds = [option for option in get_args(kind) if option is not types.NoneType]
         return None if value is None else read_value(kinds[0], value, where)
     if get_origin(kind) is tuple:
         return _read_tuple(get_args(kind), value, where)
+    if get_origin(kind) is Sequence:
+        return _read_tuple((*get_args(kind), ...), value, where)
+    if get_origin(kind) is Mapping:
+        return _read_table(get_args(kind)[1], value, where)
     if dataclasses.is_dataclass(kind):
         return read_record(kind, value, where)  # type: ignore[arg-type]
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
@@ -70,3 +76,9 @@ def _read_tuple(kinds: tuple[Any, ...], value: object, where: str) -> tuple[Any,
     return tuple(
         read_value(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(kinds, value, strict=True))
     )
+
+
+def _read_table(kind: Any, value: object, where: str) -> dict[str, Any]:  # noqa: ANN401
+    if not isinstance(value, Mapping):
+        raise WorldError(f"{where}: expected a table of names and values, got {value!r}")
+    return {str(key): read_value(kind, item, f"{where}.{key}") for key, item in value.items()}

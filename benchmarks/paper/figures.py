@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.colours import colour_of
-from benchmarks.instants import Floats
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.moves import MOVES_M
 from benchmarks.paper.published import ODOMETRY, PROPOSED, WIFI
@@ -18,6 +17,7 @@ from benchmarks.paper.summary import Spread
 from benchmarks.paper.tables import CURVES, by_median
 from benchmarks.paper.weaknesses import REPAIRED, lock_out_example
 from benchmarks.score import CHI_SQUARE_95, quantile
+from benchmarks.track import Floats
 from fusion import FusionError
 
 if TYPE_CHECKING:

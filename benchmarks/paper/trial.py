@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fusion
-from benchmarks.instants import Floats, evaluation_instants, match
+from benchmarks.instants import evaluation_instants, match
 from benchmarks.lane import Lane, run_lane
 from benchmarks.paper.moves import measured_moves
 from benchmarks.paper.published import EKF, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.readings import MISSING_OPTION, MISSING_VALUES, ORIGINS_M, READINGS, SCALE_OPTION, SCALES
 from benchmarks.paper.variants import leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
-from fusion import Decision, Update, WifiScan
+from benchmarks.track import Floats, Track
+from fusion import Decision, WifiScan
 from logs.run import Run
 from sensors.scenario import Scenario, load_scenario
 from sensors.simulate import simulated_run
@@ -47,18 +48,18 @@ def largest(errors: Floats) -> float:
     return float(np.abs(errors).max())
 
 
-def point_errors(run: Run, updates: Iterable[Update]) -> Floats:
+def point_errors(run: Run, track: Track) -> Floats:
     """Estimate minus truth where the truth was surveyed, (points, 2) [m], infinite without a valid answer."""
     assert run.truth is not None
     instants = evaluation_instants(run.truth)
-    answers = match(instants, tuple(updates))
+    answers = match(instants, track)
     away = np.stack([answers.x - instants.x, answers.y - instants.y], axis=1)
     return np.where(answers.valid[:, None], away, np.inf)
 
 
 def lane_errors(run: Run, lane: Lane) -> Floats:
     """`point_errors` of a lane; one that crashed gave no answer at all."""
-    return point_errors(run, () if lane.error else lane.updates)
+    return point_errors(run, lane.track)
 
 
 @lru_cache(maxsize=8)
@@ -98,7 +99,8 @@ def proposed_largest(run: Run, options: Mapping[str, object] | None = None) -> f
     """The largest error [m] of the proposed method, read as ``options`` say."""
     assert run.prior is not None
     estimator = fusion.load(PROPOSED)(run.world, **(options or {}))
-    return largest(point_errors(run, fusion.track(estimator, run.world, run.measurements, run.prior)))
+    updates = list(fusion.track(estimator, run.world, run.measurements, run.prior))
+    return largest(point_errors(run, Track.of(updates)))
 
 
 def _refused(lane: Lane) -> NDArray[np.bool_]:

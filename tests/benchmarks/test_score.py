@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.instants import Instants, evaluation_instants, match
 from benchmarks.score import Errors, errors, metrics, pool, quantile
+from benchmarks.track import Track
 from fusion import Covariance, Estimate, Odometry, Pose, Update, wrap_angle
 from logs.run import TruthTrack
 
@@ -34,7 +35,7 @@ def oracle_updates(count=1000, *, covariance=True, heading_known=True):
 
 def scores_of(updates, truth=TRUTH):
     instants = evaluation_instants(truth)
-    return metrics(errors(instants, match(instants, updates)))
+    return metrics(errors(instants, match(instants, Track.of(updates))))
 
 
 ORACLE_A = {
@@ -142,4 +143,4 @@ def test_pooling_weighs_every_instant_alike():
 def test_scores_of_no_instants_are_not_numbers():
     nothing = np.array([])
     instants = Instants(nothing.astype(np.int64), nothing, nothing, nothing)
-    assert math.isnan(metrics(errors(instants, match(instants, [])))["availability"])
+    assert math.isnan(metrics(errors(instants, match(instants, Track.of([]))))["availability"])

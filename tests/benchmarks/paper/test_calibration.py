@@ -78,7 +78,7 @@ def test_told_odometry_noise_covers_the_errors_it_is_told_of(environment):
     for seed in range(12):
         run = without_gyro(simulated_run(scenario, seed))
         instants = evaluation_instants(run.truth)
-        nees.append(score(instants, match(instants, run_lane(run, ODOMETRY).updates)).nees_2d)
+        nees.append(score(instants, match(instants, run_lane(run, ODOMETRY).track)).nees_2d)
     assert 0.2 < np.mean(nees) / 2.0 < 5.0
 
 

@@ -130,7 +130,7 @@ def test_gyro_turns_are_nearer_the_truth_than_wheel_turns():
         run = simulated_run(scenario, seed)
         for told, into in ((run, wheels), (with_gyro(run, scenario.reality), gyro)):
             instants = evaluation_instants(told.truth)
-            into.append(errors(instants, match(instants, run_lane(told, ODOMETRY).updates)).heading[-1])
+            into.append(errors(instants, match(instants, run_lane(told, ODOMETRY).track)).heading[-1])
     assert np.median(gyro) < 0.5 * np.median(wheels)
 
 

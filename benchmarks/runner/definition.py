@@ -1,0 +1,217 @@
+"""A suite: which runs, which estimators with which parameters, which faults, how often, and what counts as passing.
+
+A TOML file with nothing but data, read once and checked whole before any work. Paths in it are relative to it.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+
+from benchmarks.instants import GAP_S, MAX_AGE_S, RATE_HZ
+from fusion import SuiteError, WorldError
+from fusion.errors import did_you_mean
+from fusion.schema import read_record
+
+CLEAN = "clean"
+"""The fault that is none; every suite has it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """When estimates are judged: `benchmarks.instants`."""
+
+    hz: float = RATE_HZ
+    reading: str = "causal"
+    max_age_s: float = MAX_AGE_S
+    gap_s: float = GAP_S
+
+
+@dataclass(frozen=True, slots=True)
+class CellLimits:
+    """What one cell may take: wall-clock time [s] and resident memory [MB]."""
+
+    wall_s: float = 600.0
+    rss_mb: float = 4096.0
+
+
+@dataclass(frozen=True, slots=True)
+class RunSource:
+    """Where a run comes from: a log of ours, a foreign bag with its ``world``, or a simulated ``scenario``."""
+
+    id: str
+    mcap: str | None = None
+    world: str | None = None
+    topics: Mapping[str, str] = field(default_factory=dict)
+    truth_to_map: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    scenario: str | None = None
+    seed: int = 0
+    duration_s: float | None = None
+    split: str = "test"
+    catalogue: str | None = None
+    """Where a log that is not there comes from: a set of `benchmarks/suites/catalogue.toml`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contestant:
+    """One estimator with one set of parameters. ``use`` is its installed name; ``grid`` makes one contestant of each
+    combination; ``tuned_on`` names the runs its parameters were chosen on.
+    """
+
+    id: str
+    use: str
+    params: Mapping[str, object] = field(default_factory=dict)
+    grid: Mapping[str, Sequence[object]] = field(default_factory=dict)
+    tuned_on: tuple[str, ...] = ()
+
+    def combinations(self) -> list[Contestant]:
+        """One contestant per point of the grid."""
+        if not self.grid:
+            return [self]
+        found = []
+        for values in product(*self.grid.values()):
+            chosen = dict(zip(self.grid, values, strict=True))
+            suffix = ",".join(f"{key}={value}" for key, value in chosen.items())
+            found.append(Contestant(f"{self.id}[{suffix}]", self.use, {**self.params, **chosen}, {}, self.tuned_on))
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class FaultSet:
+    """Faults applied together, as tables of `benchmarks.faults`."""
+
+    id: str
+    apply: Sequence[Mapping[str, object]] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """What `bench gate` demands. ``ratio``: by how much a metric may grow over the baseline; ``floor``: its least
+    value; ``inside``: metrics that must lie in their chi-square band; ``inconclusive``: what "cannot tell" is.
+    """
+
+    baseline: str | None = None
+    ratio: Mapping[str, float] = field(default_factory=dict)
+    floor: Mapping[str, float] = field(default_factory=dict)
+    inside: tuple[str, ...] = ()
+    inconclusive: str = "fail"
+
+
+@dataclass(frozen=True, slots=True)
+class _Head:
+    name: str
+    seed: int = 0
+    seeds: int = 1
+    eval: Evaluation = Evaluation()
+    limits: CellLimits = CellLimits()
+    topics: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class _File:
+    """The suite as it is written."""
+
+    suite: _Head
+    runs: tuple[RunSource, ...]
+    estimators: tuple[Contestant, ...]
+    faults: tuple[FaultSet, ...] = ()
+    gate: Gate = Gate()
+
+
+@dataclass(frozen=True, slots=True)
+class Suite:
+    """A suite, checked: grids are spread out, every run knows its topics, and `CLEAN` is the first of the faults."""
+
+    name: str
+    seed: int
+    seeds: int
+    evaluation: Evaluation
+    limits: CellLimits
+    runs: tuple[RunSource, ...]
+    contestants: tuple[Contestant, ...]
+    faults: tuple[FaultSet, ...]
+    gate: Gate
+    folder: Path
+
+    def run(self, run_id: str) -> RunSource:
+        """The run of that id."""
+        return next(run for run in self.runs if run.id == run_id)
+
+
+def load_suite(path: Path) -> Suite:
+    """The suite in a TOML file; raises `SuiteError` that says where it is wrong."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        written = read_record(_File, table, str(path))
+    except OSError as error:
+        raise SuiteError(f"{path}: cannot be read ({error.strerror}); give a suite file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SuiteError(f"{path}: not TOML: {error}; correct that line") from error
+    except WorldError as error:
+        raise SuiteError(str(error)) from error
+    return _checked(written, path)
+
+
+def _checked(written: _File, path: Path) -> Suite:
+    head = written.suite
+    contestants = tuple(each for estimator in written.estimators for each in estimator.combinations())
+    faults = (FaultSet(CLEAN), *written.faults)
+    for what, items in (("runs", written.runs), ("estimators", contestants), ("faults", faults)):
+        _require_unique([item.id for item in items], f"{path}: {what}")
+    for number, run in enumerate(written.runs):
+        _check_run(run, f"{path}: runs[{number}] ({run.id})")
+    _check_head(head, f"{path}: suite")
+    _check_tuning(written, path)
+    return Suite(
+        head.name,
+        head.seed,
+        head.seeds,
+        head.eval,
+        head.limits,
+        written.runs,
+        contestants,
+        faults,
+        written.gate,
+        path.resolve().parent,
+    )
+
+
+def _require_unique(ids: Sequence[str], where: str) -> None:
+    if not ids:
+        raise SuiteError(f"{where}: none given; a suite needs at least one")
+    for number, one in enumerate(ids):
+        if one in ids[:number]:
+            raise SuiteError(f"{where}: the id {one!r} is given twice; give each its own")
+
+
+def _check_run(run: RunSource, where: str) -> None:
+    if (run.mcap is None) == (run.scenario is None):
+        raise SuiteError(f"{where}: give either mcap, a log, or scenario, a simulated run")
+    if run.split not in ("tune", "test"):
+        raise SuiteError(f"{where}: split is {run.split!r}; {did_you_mean(run.split, ('tune', 'test'))}")
+
+
+def _check_head(head: _Head, where: str) -> None:
+    if head.seeds < 1 or head.seed < 0:
+        raise SuiteError(f"{where}: {head.seeds} seeds from seed {head.seed}; give 1 or more, from a seed not below 0")
+    if head.eval.reading not in ("causal", "interp"):
+        raise SuiteError(
+            f"{where}.eval.reading: {head.eval.reading!r}; {did_you_mean(head.eval.reading, ('causal', 'interp'))}"
+        )
+
+
+def _check_tuning(written: _File, path: Path) -> None:
+    """Nothing is judged on what it was tuned on."""
+    splits = {run.id: run.split for run in written.runs}
+    for estimator in written.estimators:
+        for run_id in estimator.tuned_on:
+            if run_id not in splits:
+                raise SuiteError(f"{path}: {estimator.id} is tuned on {run_id!r}; {did_you_mean(run_id, splits)}")
+            if splits[run_id] == "test":
+                raise SuiteError(
+                    f"{path}: {estimator.id} was tuned on {run_id}, which is a test run: its score there would be "
+                    'worth nothing; give that run split = "tune"'
+                )
