@@ -8,6 +8,7 @@ nothing: position and heading unknown, the pose at the middle of the floor.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -25,13 +26,13 @@ def starting_prior(run: Run) -> Prior:
     """The prior every estimator of ``run`` starts from, by the order above."""
     if run.prior is not None:
         return run.prior
-    start_ns = min(map(_begin_ns, run.measurements), default=0)
+    start_ns = begin_ns(run.measurements)
     return _from_truth(run, start_ns) or _unknown(run.world.bounds, start_ns)
 
 
-def _begin_ns(measurement: Measurement) -> int:
-    """The first time a measurement tells of: an increment begins before its own stamp, and must not count twice."""
-    return measurement.from_ns if isinstance(measurement, Odometry) else measurement.time_ns
+def begin_ns(measurements: Iterable[Measurement]) -> int:
+    """The first time any measurement tells of: an increment begins before its own stamp, and must not count twice."""
+    return min((m.from_ns if isinstance(m, Odometry) else m.time_ns for m in measurements), default=0)
 
 
 def _from_truth(run: Run, start_ns: int) -> Prior | None:

@@ -1,0 +1,69 @@
+"""Messages and readings of a run as columns, and how a fault finds its own among them: by topic, source and time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fusion import Gyro, MotorCommand, Odometry, ParameterError, Ranges, WheelTicks, WifiScan
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Windows = tuple[tuple[float, float], ...]
+"""Stretches of time [s] from the run's start; the beginning belongs to one, the end does not."""
+
+TOPICS: dict[type, str] = {
+    WheelTicks: "odom",
+    Odometry: "odom",
+    MotorCommand: "command",
+    Gyro: "gyro",
+    WifiScan: "wifi",
+    Ranges: "ranges",
+}
+"""What a suite calls the measurements of each type: wheels are one topic, told as counts or as increments."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Columns (n,) of messages, or of single readings. ``source``: the sensor of a message, the anchor of a reading."""
+
+    topic: NDArray[np.str_]
+    source: NDArray[np.str_]
+    elapsed_s: Floats
+    """Stamp, by its own clock, from the run's start."""
+    kept: Mask
+    """False: lost; the one column that is written into."""
+
+    def sources(self, topic: str) -> list[str]:
+        """Who speaks on ``topic``, sorted."""
+        return sorted(map(str, np.unique(self.source[self.topic == topic])))
+
+    def within(self, windows: Windows | None) -> Mask:
+        """Rows stamped in one of ``windows``; None is always."""
+        if windows is None:
+            return np.ones(len(self.kept), dtype=bool)
+        inside = np.zeros(len(self.kept), dtype=bool)
+        for begin, end in windows:
+            inside |= (begin <= self.elapsed_s) & (self.elapsed_s < end)
+        return inside
+
+    def select(self, topic: str, source: str = "", windows: Windows | None = None) -> Mask:
+        """Rows on ``topic``, from ``source`` ("": from all), in ``windows``; raises `ParameterError` for one that the
+        run does not have.
+        """
+        if topic not in self.topic:
+            known = ", ".join(sorted(set(map(str, self.topic)))) or "no measurements at all"
+            raise ParameterError(f"the run has no topic {topic!r}; it has {known}")
+        if source and source not in self.sources(topic):
+            raise ParameterError(f"the run has no {source!r} on {topic}; it has {', '.join(self.sources(topic))}")
+        chosen = (self.topic == topic) & self.within(windows)
+        return np.asarray(chosen & (self.source == source)) if source else chosen
+
+    def draw(self, topic: str, sample: Callable[[int], Floats]) -> Floats:
+        """One vector of random numbers for all rows on ``topic``, in their order; zero elsewhere."""
+        drawn, rows = np.zeros(len(self.kept)), self.topic == topic
+        drawn[rows] = sample(int(rows.sum()))
+        return drawn
