@@ -202,6 +202,12 @@ def test_two_faults_of_one_kind_and_place_draw_apart():
     assert share == pytest.approx(0.25, abs=0.05)
 
 
+def test_faults_of_different_places_draw_apart():
+    """The whole topic and its only sensor; with the same draws, half of the messages would be left."""
+    lost = struck_by(Drop("gyro", p=0.5), Drop("gyro", "gyro", p=0.5))
+    assert len(of_kind(lost, Gyro)) / len(of_kind(RUN, Gyro)) == pytest.approx(0.25, abs=0.05)
+
+
 def test_more_of_a_fault_strikes_what_less_of_it_strikes():
     few, many = (set(values(struck_by(Drop("wifi", "ap2", p=p)), WifiScan)) for p in (0.6, 0.2))
     assert few < many
@@ -333,6 +339,13 @@ def test_burst_losses_are_as_many_and_as_long_as_their_probabilities_say():
     gaps = np.diff(kept) - 1
     assert 1.0 - len(kept) / len(gyros) == pytest.approx(0.2, abs=0.02)
     assert gaps[gaps > 0].mean() == pytest.approx(4.0, rel=0.1)
+
+
+def test_burst_that_never_begins_loses_nothing_and_one_that_never_ends_all_that_follows():
+    assert struck_by(Drop("gyro", p_enter=0.0, p_exit=0.5)) == RUN
+    left = [m.seq for m in of_kind(struck_by(Drop("gyro", p_enter=0.02, p_exit=0.0)), Gyro)]
+    assert 0 < len(left) < len(of_kind(RUN, Gyro))
+    assert left == [m.seq for m in of_kind(RUN, Gyro)][: len(left)]
 
 
 def test_late_messages_keep_their_stamp_and_lose_their_place():
