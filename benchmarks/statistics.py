@@ -11,6 +11,7 @@ while the bootstraps usually offered for small samples, percentile and BCa, cove
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -119,22 +120,23 @@ def friedman_p(scores: Floats) -> float:
     return float(chdtrc(estimators - 1, (estimators - 1) * between / spread)) if spread else 1.0
 
 
-def detectable_effect(runs: NDArray[np.int64] | int, level: float = LEVEL, power: float = POWER) -> Floats:
+def detectable_effect(runs: int, level: float = LEVEL, power: float = POWER) -> float:
     """The least mean difference, in standard deviations of one run, that the two-sided t test finds with ``power``:
     (t.975 + t.80) / sqrt(runs), infinite below two runs.
     """
     from scipy.special import stdtrit
 
-    count = np.asarray(runs)
-    freedom = np.maximum(count - 1, 1)
-    quantiles = stdtrit(freedom, 0.5 * (1.0 + level)) + stdtrit(freedom, power)
-    return np.where(count < 2, np.inf, quantiles / np.sqrt(np.maximum(count, 1)))
+    if runs < 2:
+        return math.inf
+    return float(stdtrit(runs - 1, 0.5 * (1.0 + level)) + stdtrit(runs - 1, power)) / math.sqrt(runs)
 
 
 def runs_needed(effect: float, level: float = LEVEL, power: float = POWER) -> int | None:
     """The least number of runs at which ``effect`` [standard deviations of one run] is detectable; None if that is
     more than `MAX_RUNS`, or the effect is not known.
     """
-    counts = np.arange(2, MAX_RUNS + 1)
-    enough = detectable_effect(counts, level, power) <= effect
-    return int(counts[np.argmax(enough)]) if enough.any() else None
+
+    def is_detectable(runs: int) -> bool:
+        return detectable_effect(runs, level, power) <= effect
+
+    return bisect_left(range(MAX_RUNS), True, key=is_detectable) if is_detectable(MAX_RUNS) else None

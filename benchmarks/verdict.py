@@ -93,7 +93,7 @@ class Verdict:
         """The difference this many runs would show four times in five, as a share of the higher score."""
         if self.compared < 2:
             return 1.0
-        return -math.expm1(-float(detectable_effect(self.compared, self.level)) * self.log_ratio.std)
+        return -math.expm1(-detectable_effect(self.compared, self.level) * self.log_ratio.std)
 
     @property
     def runs_needed(self) -> int | None:

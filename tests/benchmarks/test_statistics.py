@@ -61,7 +61,7 @@ def test_interval_of_six_mildly_skewed_runs_covers_as_often_as_it_promises():
     ("runs", "effect"), [(4, 2.08), (6, 1.42), (8, 1.15), (12, 0.89), (20, 0.66), (40, 0.45)], ids=str
 )
 def test_detectable_effect_is_that_of_the_table(runs, effect):
-    assert round(float(detectable_effect(runs)), 2) == effect
+    assert round(detectable_effect(runs), 2) == effect
 
 
 def test_nothing_is_detectable_from_one_run():
