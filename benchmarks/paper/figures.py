@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from io import BytesIO
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.colours import colour_of
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.moves import MOVES_M
 from benchmarks.paper.published import ODOMETRY, PROPOSED, WIFI
@@ -16,33 +14,30 @@ from benchmarks.paper.readings import ORIGINS_M, READINGS, SCALES
 from benchmarks.paper.summary import Spread
 from benchmarks.paper.tables import CURVES, by_median
 from benchmarks.paper.weaknesses import REPAIRED, lock_out_example
+from benchmarks.plotting import label, panels, plain_colour, plain_ticks
 from benchmarks.score import CHI_SQUARE_95, quantile
 from benchmarks.track import Floats
-from fusion import FusionError
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-DOTS_PER_INCH = 110
 MARKERS = {ODOMETRY: "s", WIFI: "^", PROPOSED: "o"}
 
 
 def errors(outcomes: Sequence[Outcome]) -> Figure:
     """Error against trial number (the paper's Figs. 4, 7 and 8): one run, and where 90 % of all runs lie."""
-    figure, row = _panels(len(outcomes), 4.0)
+    figure, row = panels(len(outcomes), 4.0)
     for axes, outcome in zip(row, outcomes, strict=True):
         typical, trial = typical_run(outcome), np.arange(1, outcome.refused.shape[1] + 1)
         for lane, title in CURVES.items():
             values, colour = 100.0 * outcome.coordinate(lane), _colour(lane)
             low, high = ([quantile(column, share) for column in values.T] for share in (0.05, 0.95))
             axes.fill_between(trial, low, high, color=colour, alpha=0.15, linewidth=0)
-            label = None if axes is not row[0] else title
-            axes.plot(trial, values[typical], color=colour, marker=MARKERS[lane], markersize=4, label=label)
+            named = None if axes is not row[0] else title
+            axes.plot(trial, values[typical], color=colour, marker=MARKERS[lane], markersize=4, label=named)
             axes.axhline(100.0 * outcome.environment.maxima_m[lane], color=colour, linestyle=":", linewidth=1)
         title = f"{outcome.environment.title}, seed {outcome.seeds[typical]}"
-        _label(axes, title, "trial", "absolute error, larger coordinate, cm")
+        label(axes, title, "trial", "absolute error, larger coordinate, cm")
         axes.set_ylim(0.0, None)
         axes.set_xticks(range(2, len(trial) + 1, 2))
     figure.legend(loc="outside lower center", ncols=len(CURVES), frameon=False)
@@ -58,7 +53,7 @@ def typical_run(outcome: Outcome) -> int:
 def estimators(outcomes: Sequence[Outcome]) -> Figure:
     """Largest error of every estimator: median and 90 % interval, the published maximum beside it."""
     lanes = by_median(outcomes)[::-1]
-    figure, row = _panels(len(outcomes), 4.6, sharey=True)
+    figure, row = panels(len(outcomes), 4.6, sharey=True)
     for axes, outcome in zip(row, outcomes, strict=True):
         for place, lane in enumerate(lanes):
             median, low, high = (100.0 * value for value in Spread.of(outcome.largest(lane)))
@@ -66,43 +61,43 @@ def estimators(outcomes: Sequence[Outcome]) -> Figure:
             axes.plot(median, place, marker="o", color=_colour(lane))
         axes.axvline(100.0 * outcome.environment.proposed_max_m, color="black", linestyle=":", linewidth=1)
         axes.set_xscale("log")
-        _plain_ticks(axes.xaxis)
-        _label(axes, outcome.environment.title, "largest coordinate error, cm (dotted: published)", "")
+        plain_ticks(axes.xaxis)
+        label(axes, outcome.environment.title, "largest coordinate error, cm (dotted: published)", "")
     row[0].set_yticks(range(len(lanes)), lanes)
     return figure
 
 
 def readings(outcomes: Sequence[Outcome]) -> Figure:
     """Median largest error of all readings, by what the percentage is of."""
-    figure, row = _panels(len(outcomes), 3.6)
+    figure, row = panels(len(outcomes), 3.6)
     for axes, outcome in zip(row, outcomes, strict=True):
         medians = np.array([100.0 * Spread.of(column).median for column in outcome.readings.T])
         for place, scale in enumerate(SCALES):
             for feedback, filled, shift in ((True, _colour(PROPOSED), -0.12), (False, "none", 0.12)):
                 own = [k for k, each in enumerate(READINGS) if each.values[:2] == (scale, feedback)]
                 where = np.full(len(own), place + shift)
-                label = None if place or axes is not row[0] else ("feedback" if feedback else "no feedback")
-                axes.scatter(where, medians[own], s=22, facecolor=filled, edgecolor=_colour(PROPOSED), label=label)
+                named = None if place or axes is not row[0] else ("feedback" if feedback else "no feedback")
+                axes.scatter(where, medians[own], s=22, facecolor=filled, edgecolor=_colour(PROPOSED), label=named)
         for lane in CURVES:
             published = 100.0 * outcome.environment.maxima_m[lane]
             axes.axhline(published, color=_colour(lane), linestyle=":", linewidth=1)
         axes.set_yscale("log")
-        _plain_ticks(axes.yaxis)
+        plain_ticks(axes.yaxis)
         axes.set_xticks(range(len(SCALES)), SCALES)
-        _label(axes, outcome.environment.title, "outlier in percent of", "median largest error, cm")
+        label(axes, outcome.environment.title, "outlier in percent of", "median largest error, cm")
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
     return figure
 
 
 def weaknesses(outcomes: Sequence[Outcome]) -> Figure:
     """Lock-out in its minimal example, and the same runs with the origin moved."""
-    figure, row = _panels(1 + len(outcomes), 3.4)
+    figure, row = panels(1 + len(outcomes), 3.4)
     legs = lock_out_example()
     trial = [leg.trial for leg in legs]
     row[0].plot(trial, [100.0 * leg.proposed_m for leg in legs], color=_colour(PROPOSED), marker="o", label="published")
     row[0].plot(trial, [100.0 * leg.repaired_m for leg in legs], color=_colour(REPAIRED), marker="D", label="repaired")
     row[0].legend(frameon=False)
-    _label(row[0], "lock-out: one slip of 1 m, exact fixes", "trial", "error, cm")
+    label(row[0], "lock-out: one slip of 1 m, exact fixes", "trial", "error, cm")
     moved = [(offset_m, k) for k, offset_m in enumerate(ORIGINS_M) if offset_m is not None]
     for axes, outcome in zip(row[1:], outcomes, strict=True):
         spreads = 100.0 * np.array([Spread.of(outcome.origins[:, k]) for _, k in moved])
@@ -110,7 +105,7 @@ def weaknesses(outcomes: Sequence[Outcome]) -> Figure:
         axes.plot(range(len(moved)), spreads[:, 0], color=_colour(PROPOSED), marker="o")
         axes.set_xticks(range(len(moved)), [f"{offset_m:g}" for offset_m, _ in moved])
         axes.set_ylim(0.0, None)
-        _label(axes, outcome.environment.title, "origin moved by, m", "largest error, cm")
+        label(axes, outcome.environment.title, "origin moved by, m", "largest error, cm")
     return figure
 
 
@@ -118,7 +113,7 @@ def floors(outcomes: Sequence[Outcome]) -> Figure:
     """Floor, access points and route, with the 95 % ellipse of the best unbiased radio fix at each trial point."""
     from matplotlib.patches import Ellipse
 
-    figure, row = _panels(len(outcomes), 4.0)
+    figure, row = panels(len(outcomes), 4.0)
     for axes, outcome in zip(row, outcomes, strict=True):
         for wall in outcome.scenario.world.walls:
             axes.plot(*np.array(wall).T, color="0.6", linewidth=1)
@@ -130,7 +125,7 @@ def floors(outcomes: Sequence[Outcome]) -> Figure:
         anchors = np.array([(anchor.x, anchor.y) for anchor in outcome.scenario.world.anchors])
         axes.plot(*anchors.T, linestyle="none", marker="^", color="black", markersize=7)
         axes.set_aspect("equal")
-        _label(axes, outcome.environment.title, "x, m", "y, m")
+        label(axes, outcome.environment.title, "x, m", "y, m")
     return figure
 
 
@@ -144,13 +139,13 @@ def _ellipse(covariance: Floats) -> dict[str, float]:
 
 def moves(outcomes: Sequence[Outcome]) -> Figure:
     """Actual over measured distance (the paper's Fig. 3), with its trend line."""
-    figure, row = _panels(len(outcomes), 3.2)
+    figure, row = panels(len(outcomes), 3.2)
     for axes, outcome in zip(row, outcomes, strict=True):
         measured = outcome.moves[typical_run(outcome)]
         slope, offset = np.polyfit(measured, MOVES_M, 1)
         axes.plot(measured, MOVES_M, linestyle="none", marker="s", markersize=4, color=_colour(ODOMETRY))
         axes.plot(measured, slope * measured + offset, color=_colour(ODOMETRY), linewidth=1)
-        _label(axes, f"{outcome.environment.short}: y = {slope:.4f} x {offset:+.4f}", "set, m", "actual, m")
+        label(axes, f"{outcome.environment.short}: y = {slope:.4f} x {offset:+.4f}", "set, m", "actual, m")
     return figure
 
 
@@ -164,47 +159,6 @@ FIGURES: Mapping[str, Callable[[Sequence[Outcome]], Figure]] = {
 }
 
 
-def as_png(figure: Figure) -> bytes:
-    """The picture, the same bytes for the same figure and version of matplotlib."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
-    return buffer.getvalue()
-
-
-def require_matplotlib() -> None:
-    """Raises `FusionError` with the remedy where it is missing."""
-    try:
-        import matplotlib  # noqa: F401 - asked for
-    except ImportError as error:
-        raise FusionError("figures need matplotlib; pip install 'fusion-localization[plots]'") from error
-
-
-def _panels(count: int, height: float, *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
-    """A row of axes; no global state of pyplot, so nothing has to be closed."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(4.2 * count, height), layout="constrained")
-    return figure, list(figure.subplots(1, count, sharey=sharey, squeeze=False)[0])
-
-
-def _label(axes: Axes, title: str, x: str, y: str) -> None:
-    axes.set_title(title, fontsize=10)
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-    axes.grid(visible=True, color="0.9")
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def _plain_ticks(axis: Axis) -> None:
-    """1, 2, 5, 10, ... on a logarithmic axis, written out."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_locator(NullLocator())
-
-
 def _colour(lane: str) -> tuple[float, float, float]:
     """The estimator's colour everywhere; on a gyro it keeps it."""
-    red, green, blue = colour_of(lane.partition(" ")[0])
-    return red / 255.0, green / 255.0, blue / 255.0
+    return plain_colour(lane.partition(" ")[0])

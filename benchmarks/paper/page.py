@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-import base64
 import re
 from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 
+from benchmarks.page import as_html, inline_png, write
 from benchmarks.paper.assumptions import MAIN, PREMISE
 from benchmarks.paper.claims import NOT_REPRODUCED, REPRODUCED
-from benchmarks.paper.figures import FIGURES, as_png, require_matplotlib
+from benchmarks.paper.figures import FIGURES
 from benchmarks.paper.published import EKF
 from benchmarks.paper.readings import literal
 from benchmarks.paper.report import Report
 from benchmarks.paper.tables import beating, filling_curves
+from benchmarks.plotting import as_png, require_matplotlib
 from benchmarks.sheet import as_markdown
-from fusion import FusionError
 
 PLACE = re.compile(r"\{\{(table|figure|text) (\w+)\}\}")
-STYLE = """
-:root { color-scheme: light dark; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
-table { display: block; overflow-x: auto; border-collapse: collapse; font-size: 0.85rem; margin: 0.5rem 0 1.5rem; }
-th, td { border-bottom: 1px solid #8884; padding: 0.25rem 0.6rem; vertical-align: top; }
-th { text-align: left; }
-img { max-width: 100%; background: white; }
-td[style*="right"] { white-space: nowrap; }
-code { font-size: 0.9em; }
-"""
 
 
 def markdown(report: Report, figure_link: Callable[[str], str]) -> str:
@@ -95,35 +85,24 @@ def write_markdown(report: Report, path: Path) -> list[Path]:
     figures = {name: path.with_name(f"{path.stem}-{name}.png") for name in FIGURES}
     write(path, markdown(report, lambda name: figures[name].name).encode())
     for name, place in figures.items():
-        write(place, as_png(FIGURES[name](report.outcomes)))
+        write(place, _drawn(report, name))
     return [path, *figures.values()]
 
 
 def write_html(report: Report, path: Path) -> None:
     """One self-contained file; raises `FusionError`."""
     require_matplotlib()
-    from markdown_it import MarkdownIt
+    write(
+        path,
+        as_html("Hybrid localization, reproduced", markdown(report, lambda name: inline_png(_drawn(report, name)))),
+    )
 
-    def inline(name: str) -> str:
-        picture = as_png(FIGURES[name](report.outcomes))
-        return "data:image/png;base64," + base64.b64encode(picture).decode()
 
-    body = MarkdownIt("commonmark").enable("table").render(markdown(report, inline))
-    title = "Hybrid localization, reproduced"
-    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
-    write(path, f'<!doctype html><html lang="en"><head>{head}<style>{STYLE}</style></head>{body}</html>\n'.encode())
+def _drawn(report: Report, name: str) -> bytes:
+    return as_png(FIGURES[name](report.outcomes))
 
 
 def write_png(report: Report, path: Path) -> None:
     """The paper's three result figures; raises `FusionError`."""
     require_matplotlib()
-    write(path, as_png(FIGURES["errors"](report.outcomes)))
-
-
-def write(path: Path, content: bytes) -> None:
-    """Raises `FusionError` where that cannot be."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-    except OSError as error:
-        raise FusionError(f"{path}: cannot be written ({error.strerror}); give another place") from error
+    write(path, _drawn(report, "errors"))

@@ -10,11 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.arguments import at_least_one
+from benchmarks.page import write
 from benchmarks.paper.calibrated import write_calibrated
 from benchmarks.paper.experiment import run_experiments
-from benchmarks.paper.figures import require_matplotlib
-from benchmarks.paper.page import write, write_html, write_markdown, write_png
+from benchmarks.paper.page import write_html, write_markdown, write_png
 from benchmarks.paper.report import Report
+from benchmarks.plotting import require_matplotlib
 from benchmarks.progress import Progress, progress_bar
 from benchmarks.sheet import print_sheets
 

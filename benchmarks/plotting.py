@@ -1,0 +1,64 @@
+"""What all our pictures by matplotlib have in common: panels in a row, plain axes, the colours of the review."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+from benchmarks.colours import colour_of
+from fusion import FusionError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+DOTS_PER_INCH = 110
+PANEL_INCHES = 4.2
+
+
+def require_matplotlib() -> None:
+    """Raises `FusionError` with the remedy where it is missing."""
+    try:
+        import matplotlib  # noqa: F401 - asked for
+    except ImportError as error:
+        raise FusionError("figures need matplotlib; pip install 'fusion-localization[plots]'") from error
+
+
+def panels(count: int, height: float, *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
+    """A row of ``count`` axes, ``height`` inches tall; no global state of pyplot, so nothing has to be closed."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(PANEL_INCHES * count, height), layout="constrained")
+    return figure, list(figure.subplots(1, count, sharey=sharey, squeeze=False)[0])
+
+
+def label(axes: Axes, title: str, x: str, y: str) -> None:
+    """Title and axes, on a light grid."""
+    axes.set_title(title, fontsize=10)
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.grid(visible=True, color="0.9")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def plain_ticks(axis: Axis) -> None:
+    """1, 2, 5, 10, ... on a logarithmic axis, written out."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
+
+
+def plain_colour(estimator: str) -> tuple[float, float, float]:
+    """The estimator's colour in every picture, from 0 to 1."""
+    red, green, blue = colour_of(estimator)
+    return red / 255.0, green / 255.0, blue / 255.0
+
+
+def as_png(figure: Figure) -> bytes:
+    """The picture, the same bytes for the same figure and version of matplotlib."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    return buffer.getvalue()
