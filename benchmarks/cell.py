@@ -19,6 +19,7 @@ import fusion
 from benchmarks.instants import evaluation_instants, match
 from benchmarks.lane import Lane, run_lane
 from benchmarks.score import Errors, errors, metrics
+from benchmarks.track import Track
 from logs.reader import read_run
 from logs.run import Run
 
@@ -107,13 +108,18 @@ def _errors(run: Run, lane: Lane) -> Errors | None:
 def _status(lane: Lane, measured: Errors | None) -> str:
     if lane.error is not None:
         return "crashed"
-    if not lane.track.is_sound:
+    return status_of(lane.track, {} if measured is None else metrics(measured))
+
+
+def status_of(track: Track, measured: Mapping[str, float]) -> str:
+    """How a lane that was not lost ended; ``measured`` are its metrics, empty without truth."""
+    if not track.is_sound:
         return "diverged"
-    if measured is None:
+    if not measured:
         return "unscored"
-    available = float(np.isfinite(measured.position).mean())
     # Fewer than half of the answers valid is also what makes the median infinite.
-    return "diverged" if available < LEAST_AVAILABILITY or not math.isfinite(metrics(measured)["pos_p50"]) else "ok"
+    lost = measured["availability"] < LEAST_AVAILABILITY or not math.isfinite(measured["pos_p50"])
+    return "diverged" if lost else "ok"
 
 
 def _facts(cell: Cell, run: Run) -> dict[str, object]:

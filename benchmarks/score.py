@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from benchmarks.instants import Answers, Instants, wrap_angles
 from benchmarks.track import Floats
 
+METRICS_VERSION = 1
+"""Changes whenever a metric does, so that stored scores are not taken for current ones."""
 AUC_RADIUS_M = 3.0
 CHI_SQUARE_95 = {2: 5.991464547107979, 3: 7.814727903251179}
 """Values a chi-square variable of 2 and 3 degrees of freedom exceeds once in twenty."""

@@ -37,6 +37,14 @@ VERBS = {
     "check": Verb("fusion.check", "hold an estimator against the contract"),
 }
 
+GROUPS = {
+    "bench": {
+        "plan": Verb("benchmarks.runner.plan_verb", "what a suite would compute, and what of it is there"),
+        "run": Verb("benchmarks.runner.run_verb", "compute what is missing of a suite"),
+    },
+}
+"""Verbs under verbs; without one of them the verb itself is meant (`fusion bench RUN`)."""
+
 
 class _Parser(argparse.ArgumentParser):
     """An argument parser that answers unknown verbs with the nearest one."""
@@ -46,8 +54,14 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}\n")
 
 
-def _verb_parser(name: str, module: Any) -> argparse.ArgumentParser:  # noqa: ANN401 - a module
-    parser = _Parser(prog=f"fusion {name}", description=VERBS[name].summary)
+def _verb_parser(name: str, verb: Verb, module: Any) -> argparse.ArgumentParser:  # noqa: ANN401 - a module
+    group = "\n".join(f"  fusion {name} {word:<8} {sub.summary}" for word, sub in GROUPS.get(name, {}).items())
+    parser = _Parser(
+        prog=f"fusion {name}",
+        description=verb.summary,
+        epilog=group,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     module.configure(parser)
     return parser
 
@@ -75,19 +89,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if words[0] not in VERBS:
         sys.stderr.write(f"fusion: there is no verb {words[0]!r}; {did_you_mean(words[0], VERBS)}\n")
         return 2
-    return _run(words[0], words[1:])
+    group = GROUPS.get(words[0], {})
+    if len(words) > 1 and words[1] in group:
+        return _run(" ".join(words[:2]), group[words[1]], words[2:])
+    return _run(words[0], VERBS[words[0]], words[1:])
 
 
-def _run(verb: str, words: Sequence[str]) -> int:
-    module = importlib.import_module(VERBS[verb].module)
-    parsed = _verb_parser(verb, module).parse_args(words)
+def _run(name: str, verb: Verb, words: Sequence[str]) -> int:
+    module = importlib.import_module(verb.module)
+    parsed = _verb_parser(name, verb, module).parse_args(words)
     try:
         return int(module.run(parsed))
     except FusionError as error:
-        sys.stderr.write(f"fusion {verb}: {error}\n")
+        sys.stderr.write(f"fusion {name}: {error}\n")
         return 1
     except KeyboardInterrupt:
-        sys.stderr.write(f"fusion {verb}: interrupted\n")
+        sys.stderr.write(f"fusion {name}: interrupted\n")
         return 130
     except BrokenPipeError:
         # The reader of our output went away (`fusion info RUN | head`): nothing is wrong here.

@@ -1,0 +1,124 @@
+"""Cells carried out: an estimate each, then a score each, kept apart, so that a new metric scores old tracks again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from benchmarks.cell import status_of
+from benchmarks.faults import apply_faults
+from benchmarks.instants import evaluation_instants, match
+from benchmarks.lane import Lane, run_lane
+from benchmarks.runner.definition import CLEAN, CellLimits
+from benchmarks.runner.plan import Cell, read_faults
+from benchmarks.runner.source import open_run
+from benchmarks.runner.store import Store, to_json
+from benchmarks.score import errors, metrics
+from benchmarks.track import Track, from_bytes, to_bytes
+from benchmarks.workers import Limits, Loss, compute
+from logs.run import Run
+
+LOST = {
+    Loss.CRASHED: "its process died, twice; run it alone with --workers 1 to see why",
+    Loss.TIMEOUT: "it took longer than limits.wall_s of the suite",
+    Loss.OUT_OF_MEMORY: "it took more memory than limits.rss_mb of the suite",
+}
+
+
+class Done(NamedTuple):
+    """One cell that has its estimate and its score, and how it ended."""
+
+    cell: Cell
+    status: str
+
+
+def execute(cells: Sequence[Cell], store: Store, *, workers: int, limits: CellLimits | None) -> Iterator[Done]:
+    """Carry out ``cells``; each is answered as it is done, and what is in the store already is left as it is.
+
+    ``limits`` None: in this process when ``workers`` is 1, and without an end.
+    """
+    tasks = [(cell, store.folder) for cell in cells]
+    bounded = None if limits is None else Limits(limits.wall_s, limits.rss_mb)
+    for index, status in compute(carry_out, give_up, tasks, workers, bounded):
+        yield Done(cells[index], status)
+
+
+def carry_out(task: tuple[Cell, Path]) -> str:
+    """Make what is missing of one cell; answers its status. Raises for the run, never for the estimator."""
+    cell, folder = task
+    store = Store(folder)
+    if not store.has("estimates", cell.estimate_key):
+        run = faulty_run(cell)
+        keep(cell, store, run_lane(run, cell.contestant.use, cell.contestant.params, cell.seed), len(run.measurements))
+    return score(cell, store)
+
+
+def give_up(task: tuple[Cell, Path], loss: Loss) -> str:
+    """Keep what became of a cell whose process did not survive it: a failure is a result too."""
+    cell, folder = task
+    store = Store(folder)
+    keep(cell, store, Lane(cell.contestant.use, (), "", 0.0, LOST[loss]), 0, ended=loss.value)
+    return score(cell, store)
+
+
+def faulty_run(cell: Cell) -> Run:
+    """The run with the cell's faults in it, drawn by the run's id in the suite: the same for every estimator."""
+    run = open_run(cell.run, cell.folder)
+    if cell.fault.id == CLEAN:
+        return run
+    faults = read_faults(cell.fault)
+    named = replace(run, name=cell.run.id)
+    return apply_faults(named, faults, suite_seed=cell.suite_seed, fault_id=cell.fault.id, seed=cell.seed)
+
+
+def keep(cell: Cell, store: Store, lane: Lane, measurements: int, ended: str = "crashed") -> None:
+    """Put the estimate of a cell into the store."""
+    result = {
+        "cell": str(cell),
+        "ended": ended if lane.error else "ok",
+        "error": lane.error,
+        "digest": lane.digest,
+        "measurements": measurements,
+        "fates": lane.fates.counts,
+        "nis_mean": lane.fates.nis_mean,
+    }
+    store.write(
+        "estimates", cell.estimate_key, {"result.json": to_json(result), "track.npz": to_bytes(lane.track, lane.fates)}
+    )
+
+
+def score(cell: Cell, store: Store) -> str:
+    """Judge the estimate in the store, unless that was done; answers the status."""
+    if not store.has("scores", cell.score_key):
+        made = store.read_json("estimates", cell.estimate_key, "result.json")
+        track, _ = from_bytes(store.read("estimates", cell.estimate_key, "track.npz"))
+        measured = _metrics(cell, track)
+        status = made["ended"] if made["error"] else status_of(track, measured)
+        found = {"status": status, "metrics": {key: _finite(value) for key, value in measured.items()}}
+        store.write("scores", cell.score_key, {"result.json": to_json(found)})
+    return str(store.read_json("scores", cell.score_key, "result.json")["status"])
+
+
+def _metrics(cell: Cell, track: Track) -> dict[str, float]:
+    """Empty without truth."""
+    truth = open_run(cell.run, cell.folder).truth
+    if truth is None or len(truth) == 0:
+        return {}
+    rules = cell.evaluation
+    instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
+    return metrics(errors(instants, match(instants, track, max_age_s=rules.max_age_s)))
+
+
+def _finite(value: float) -> float | str | None:
+    """JSON knows neither infinity nor NaN; here infinity means "most is lost", NaN "nothing to say"."""
+    if math.isnan(value):
+        return None
+    return "inf" if math.isinf(value) else value
+
+
+def read_metrics(stored: dict[str, Any]) -> dict[str, float]:
+    """Metrics as `score` wrote them, as numbers again."""
+    return {key: math.nan if value is None else float(value) for key, value in stored["metrics"].items()}

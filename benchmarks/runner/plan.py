@@ -1,0 +1,121 @@
+"""The cells of a suite, and the keys that say what each result depends on."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import product
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import fusion
+from benchmarks.fault_kind import Fault
+from benchmarks.faults import read_fault
+from benchmarks.runner.definition import CLEAN, Contestant, Evaluation, FaultSet, RunSource, Suite
+from benchmarks.runner.source import Content, content_of, fingerprint
+from benchmarks.runner.store import Store, key_of
+from benchmarks.score import METRICS_VERSION
+from fusion import SuiteError
+from fusion.errors import did_you_mean
+from fusion.plugins import parameters
+
+
+class Cell(NamedTuple):
+    """One run, one contestant, one set of faults, one seed: a pure function of what its spec says, and its keys."""
+
+    run: RunSource
+    contestant: Contestant
+    fault: FaultSet
+    seed: int
+    suite_seed: int
+    evaluation: Evaluation
+    folder: Path
+    content: Content
+    estimate_key: str
+    score_key: str
+
+    def __str__(self) -> str:
+        return f"{self.run.id} {self.contestant.id} {self.fault.id} {self.seed}"
+
+
+def cells_of(suite: Suite, store: Store) -> list[Cell]:
+    """Every cell, run by run, so that each run is opened few times; raises before any work what can be refused."""
+    made = {contestant.id: contestant_spec(contestant) for contestant in suite.contestants}
+    for fault in suite.faults:
+        read_faults(fault)
+    cells = []
+    for run in suite.runs:
+        content = content_of(run, suite.folder, store)
+        for fault, contestant, seed in product(suite.faults, suite.contestants, range(suite.seeds)):
+            spec = {**made[contestant.id], **run_spec(suite, run, fault, content), "seed": seed}
+            cells.append(_cell(suite, run, contestant, fault, seed, content, key_of(spec)))
+    return cells
+
+
+def _cell(
+    suite: Suite,
+    run: RunSource,
+    contestant: Contestant,
+    fault: FaultSet,
+    seed: int,
+    content: Content,
+    estimate_key: str,
+) -> Cell:
+    judged = {"truth": content.truth, "evaluation": asdict(suite.evaluation), "metrics": METRICS_VERSION}
+    score_key = key_of({"estimate": estimate_key, **judged})
+    return Cell(
+        run, contestant, fault, seed, suite.seed, suite.evaluation, suite.folder, content, estimate_key, score_key
+    )
+
+
+def contestant_spec(contestant: Contestant) -> dict[str, object]:
+    """What an estimate depends on beside the run: code, parameters (those not given at their defaults), numerics."""
+    made = fusion.load(contestant.use)
+    known = {name: parameter.default for name, parameter in parameters(made).items()}
+    for key in contestant.params:
+        if key not in known:
+            hint = did_you_mean(key, known)
+            raise SuiteError(f"estimator {contestant.id}: {contestant.use} has no parameter {key!r}; {hint}")
+    return {
+        "estimator": f"{made.__module__}:{made.__qualname__}",
+        "code": fingerprint(made.__module__),
+        "parameters": {**known, **contestant.params},
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+    }
+
+
+def run_spec(suite: Suite, run: RunSource, fault: FaultSet, content: Content) -> dict[str, object]:
+    """What an estimate depends on of the run. Faults are drawn by suite seed and run, never by estimator."""
+    if fault.id == CLEAN:
+        return {"measured": content.measured}
+    drawn = {"id": fault.id, "apply": [dict(one) for one in fault.apply], "run": run.id, "suite_seed": suite.seed}
+    return {"measured": content.measured, "fault": drawn}
+
+
+def read_faults(faults: FaultSet) -> list[Fault]:
+    """The faults of a set; raises `ParameterError` that names the one that is wrong."""
+    return [read_fault(table, f"fault {faults.id}: apply[{i}]") for i, table in enumerate(faults.apply)]
+
+
+class Missing(NamedTuple):
+    """What of a plan is still to be done."""
+
+    estimates: list[Cell]
+    scores: list[Cell]
+
+
+def missing(cells: Sequence[Cell], store: Store) -> Missing:
+    """The cells without an estimate, and those with one but without a score."""
+    estimates = [one for one in cells if not store.has("estimates", one.estimate_key)]
+    unmade = {one.estimate_key for one in estimates}
+    scores = [one for one in cells if one.estimate_key not in unmade and not store.has("scores", one.score_key)]
+    return Missing(estimates, scores)
+
+
+def shard(cells: Sequence[Cell], number: int, count: int) -> list[Cell]:
+    """The part of ``cells`` of shard ``number`` of ``count``, from 1: told by the keys, so that all machines agree."""
+    return [one for one in cells if int(one.estimate_key[:16], 16) % count == number - 1]

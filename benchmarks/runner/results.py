@@ -1,0 +1,73 @@
+"""The results of a suite as they stand in the store."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.runner.definition import CLEAN
+from benchmarks.runner.execute import read_metrics
+from benchmarks.runner.plan import Cell
+from benchmarks.runner.store import Store
+from benchmarks.score import quantile
+from benchmarks.sheet import Sheet
+from benchmarks.table import COLUMNS, as_text
+
+RANKED_BY = "pos_p75"
+ALIVE = ("ok", "unscored")
+"""Statuses of a cell that was not lost."""
+
+
+class Result(NamedTuple):
+    """One cell's score: infinite and NaN metrics are what `benchmarks.score` says they are."""
+
+    cell: Cell
+    status: str
+    error: str | None
+    digest: str
+    metrics: Mapping[str, float]
+    facts: Mapping[str, object]
+
+
+def read_results(cells: Iterable[Cell], store: Store) -> list[Result]:
+    """Of the cells that have a score; those that have none are left out."""
+    found = []
+    for cell in cells:
+        if store.has("scores", cell.score_key):
+            scored = store.read_json("scores", cell.score_key, "result.json")
+            made = store.read_json("estimates", cell.estimate_key, "result.json")
+            found.append(Result(cell, scored["status"], made["error"], made["digest"], read_metrics(scored), made))
+    return found
+
+
+def by_contestant(results: Sequence[Result], fault: str = CLEAN) -> dict[str, list[Result]]:
+    """The results under one fault, by contestant, in the suite's order."""
+    grouped: dict[str, list[Result]] = {}
+    for result in results:
+        if result.cell.fault.id == fault:
+            grouped.setdefault(result.cell.contestant.id, []).append(result)
+    return grouped
+
+
+def median_metrics(results: Sequence[Result]) -> dict[str, float]:
+    """The median over cells of every metric. A lost cell is infinite in the quantiles, so it cannot flatter; where a
+    metric has nothing to say (NaN) the cell does not count.
+    """
+    names = {name for result in results for name in result.metrics}
+    columns = {name: np.array([result.metrics.get(name, math.nan) for result in results]) for name in names}
+    return {name: quantile(column[~np.isnan(column)], 0.5) for name, column in columns.items()}
+
+
+def leaderboard(results: Sequence[Result], fault: str = CLEAN) -> Sheet:
+    """The contestants, the best first: by how many cells were lost, then by the median of the ranking metric."""
+    shown = [column for column in COLUMNS if column.key != "cpu_per_measurement_s"]
+    rows = []
+    for name, own in by_contestant(results, fault).items():
+        lost, medians = sum(result.status not in ALIVE for result in own), median_metrics(own)
+        numbers = (as_text(column, medians) for column in shown)
+        rows.append(((lost, medians.get(RANKED_BY, math.inf), name), (name, f"{len(own) - lost}/{len(own)}", *numbers)))
+    head = ("position error of", "cells ok", *(column.title for column in shown))
+    return Sheet(f"{fault}: medians over cells", head, tuple(row for _, row in sorted(rows)))

@@ -1,0 +1,118 @@
+"""The runs of a suite, opened once for all the cells that need them, and told apart by their content."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from functools import cache, lru_cache
+from importlib import import_module
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks.runner.definition import RunSource
+from benchmarks.runner.store import Store, key_of, to_json
+from fusion import SuiteError
+from fusion.values import nanoseconds
+from logs.reader import read_run
+from logs.run import Run, TruthTrack
+from sensors.scenario import load_scenario, scenario_text
+from sensors.simulate import simulated_run
+
+KEPT_RUNS = 2
+"""Open runs a worker keeps: cells come run by run."""
+
+
+class Content(NamedTuple):
+    """What a run holds, as hashes: what estimators see of it, and the truth they are scored on ("" for none)."""
+
+    measured: str
+    truth: str
+
+
+def place_of(source: RunSource, folder: Path) -> Path:
+    """The log of a run, from the folder of its suite; raises `SuiteError` when it is not there."""
+    path = folder / str(source.mcap)
+    if not path.is_file():
+        brought = f"; `fusion import` brings it, see {source.catalogue} in the catalogue" if source.catalogue else ""
+        raise SuiteError(f"run {source.id}: {path} is not there{brought or '; give the path from the suite file'}")
+    return path
+
+
+def open_run(source: RunSource, folder: Path) -> Run:
+    """The run, whole; the last few are kept open. Raises `SuiteError`, `LogError` or `WorldError`."""
+    if source.scenario is not None:
+        return _simulated(_scenario_place(source.scenario, folder), source.seed, source.duration_s)
+    path = place_of(source, folder)
+    return _read(path, path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=KEPT_RUNS)
+def _read(path: Path, _modified_ns: int) -> Run:
+    return read_run(path)
+
+
+@lru_cache(maxsize=KEPT_RUNS)
+def _simulated(scenario: str | Path, seed: int, duration_s: float | None) -> Run:
+    run = simulated_run(load_scenario(scenario), seed)
+    return run if duration_s is None else _cut(run, nanoseconds(duration_s))
+
+
+def _scenario_place(scenario: str, folder: Path) -> str | Path:
+    return folder / scenario if scenario.endswith(".toml") else scenario
+
+
+def _cut(run: Run, end_ns: int) -> Run:
+    """The run up to ``end_ns``."""
+    kept = tuple(measurement for measurement in run.measurements if measurement.time_ns <= end_ns)
+    truth = run.truth
+    if truth is not None:
+        early = truth.time_ns <= end_ns
+        truth = TruthTrack(truth.time_ns[early], truth.x[early], truth.y[early], truth.heading[early])
+    return replace(run, measurements=kept, truth=truth)
+
+
+def content_of(source: RunSource, folder: Path, store: Store) -> Content:
+    """The content of a run. A log is read for it once; then its size, time and place on the disk tell it again."""
+    if source.scenario is not None:
+        return _content_of_scenario(source, folder)
+    path = place_of(source, folder)
+    status = path.stat()
+    seen = key_of(
+        {"path": str(path), "size": status.st_size, "modified_ns": status.st_mtime_ns, "inode": status.st_ino}
+    )
+    if not store.has("runs", seen):
+        measured = content_of_run(open_run(source, folder))
+        store.write("runs", seen, {"content.json": to_json(measured._asdict())})
+    return Content(**store.read_json("runs", seen, "content.json"))
+
+
+def _content_of_scenario(source: RunSource, folder: Path) -> Content:
+    """A simulated run is what its scenario, its seed and the simulator make of it."""
+    text = scenario_text(_scenario_place(str(source.scenario), folder))
+    made = key_of({"text": text, "seed": source.seed, "duration_s": source.duration_s, "code": fingerprint("sensors")})
+    return Content(made, made)
+
+
+def content_of_run(run: Run) -> Content:
+    """Hashes of everything an estimator sees, and of the truth."""
+    measured = hashlib.sha256(run.world.table.encode())
+    measured.update(repr(run.prior).encode())
+    for measurement in run.measurements:
+        measured.update(repr(measurement).encode())
+    truth = hashlib.sha256()
+    for column in () if run.truth is None else (run.truth.time_ns, run.truth.x, run.truth.y, run.truth.heading):
+        truth.update(column.tobytes())
+    return Content(measured.hexdigest(), "" if run.truth is None else truth.hexdigest())
+
+
+@cache
+def fingerprint(module: str) -> str:
+    """A hash of the sources that ``module`` is made of: of its package, and of `fusion`, on which all others rest."""
+    total = hashlib.sha256()
+    for name in sorted({module.partition(".")[0], "fusion"}):
+        root = Path(str(import_module(name).__file__))
+        paths = sorted(root.parent.rglob("*.py")) if root.name == "__init__.py" else [root]
+        for path in paths:
+            total.update(f"{name}/{path.relative_to(root.parent)}".encode())
+            total.update(path.read_bytes())
+    return total.hexdigest()

@@ -1,0 +1,213 @@
+"""A suite is computed once: whatever the workers, the order, the shards, or how often it was interrupted."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from benchmarks.runner.definition import load_suite
+from benchmarks.runner.execute import carry_out, faulty_run
+from benchmarks.runner.plan import cells_of, missing, shard
+from benchmarks.runner.results import leaderboard, read_results
+from benchmarks.runner.run_verb import run_suite
+from benchmarks.runner.source import open_run
+from benchmarks.runner.store import Store
+from fusion import SuiteError
+from fusion.cli import main
+from sensors.simulate import simulate
+
+SUITE = """
+[suite]
+name = "small"
+seeds = 2
+limits = { wall_s = 60.0, rss_mb = 2000.0 }
+[[runs]]
+id = "office"
+scenario = "paper_office"
+duration_s = 20.0
+[[runs]]
+id = "mec"
+scenario = "paper_mec"
+seed = 3
+duration_s = 20.0
+[[estimators]]
+id = "wheels"
+use = "dead_reckoning"
+[[estimators]]
+id = "pf"
+use = "particle"
+"""
+
+
+@pytest.fixture
+def suite(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(SUITE, encoding="utf-8")
+    return load_suite(path)
+
+
+def everything(store):
+    """Every file of a store with its bytes."""
+    found = {}
+    for path in sorted(path for path in store.folder.rglob("*") if path.is_file()):
+        name = str(path.relative_to(store.folder))
+        found[name] = path.read_bytes()
+    return found
+
+
+def digests(results):
+    return [(str(result.cell), result.status, result.digest, dict(result.metrics)) for result in results]
+
+
+def test_workers_and_shards_change_nothing(suite, tmp_path):
+    alone, two, parts = (Store(tmp_path / name) for name in ("alone", "two", "parts"))
+    expected = digests(run_suite(suite, alone, workers=1))
+    assert len(expected) == 8
+    assert digests(run_suite(suite, two, workers=2)) == expected
+    cells = cells_of(suite, parts)
+    own = [shard(cells, number, 3) for number in (1, 2, 3)]
+    assert Counter(str(cell) for part in own for cell in part) == Counter(map(str, cells))
+    for number in (3, 1, 2):
+        results = run_suite(suite, parts, workers=1, part=(number, 3))
+    assert digests(results) == expected
+    assert everything(alone) == everything(two) == everything(parts)
+
+
+def test_only_what_is_missing_runs_again(suite, tmp_path):
+    store, seen = Store(tmp_path / "store"), []
+    cells = cells_of(suite, store)
+    carry_out((cells[0], store.folder))
+    assert len(missing(cells, store).estimates) == 7
+    run_suite(suite, store, workers=1, progress=lambda done, total, what: seen.append(total))
+    assert seen == [7] * 7
+    run_suite(suite, store, workers=1, progress=lambda done, total, what: seen.append(total))
+    assert len(seen) == 7
+
+
+def test_another_evaluation_scores_old_tracks_again_without_an_estimator(suite, tmp_path):
+    from dataclasses import replace
+
+    store = Store(tmp_path / "store")
+    run_suite(suite, store, workers=1)
+    stricter = replace(suite, evaluation=replace(suite.evaluation, max_age_s=0.5))
+    todo = missing(cells_of(stricter, store), store)
+    assert (len(todo.estimates), len(todo.scores)) == (0, 8)
+    assert len(run_suite(stricter, store, workers=1)) == 8
+
+
+def test_a_key_depends_on_run_parameters_seed_and_nothing_else(suite, tmp_path):
+    store = Store(tmp_path / "store")
+    keys = [cell.estimate_key for cell in cells_of(suite, store)]
+    assert len(set(keys)) == len(keys)
+    changed = tmp_path / "changed.toml"
+    changed.write_text(SUITE.replace('"small"', '"other"').replace('id = "pf"', 'id = "renamed"'), encoding="utf-8")
+    assert [cell.estimate_key for cell in cells_of(load_suite(changed), store)] == keys
+    changed.write_text(SUITE + "params = { particles = 300 }\n", encoding="utf-8")
+    different = [cell.estimate_key for cell in cells_of(load_suite(changed), store)]
+    assert [a == b for a, b in zip(keys, different, strict=True)] == [True, True, False, False] * 2
+
+
+def test_faults_are_drawn_alike_for_every_estimator_and_leave_the_truth_alone(tmp_path):
+    faults = '[[faults]]\nid = "noise"\napply = [{ kind = "rssi_noise", std_db = 6.0 }]\n'
+    (tmp_path / "faults.toml").write_text(SUITE + faults, encoding="utf-8")
+    cells = cells_of(load_suite(tmp_path / "faults.toml"), Store(tmp_path / "store"))
+    noisy = [cell for cell in cells if cell.fault.id == "noise" and cell.run.id == "office"]
+    assert len(noisy) == 4
+    assert len({cell.estimate_key for cell in cells}) == len(cells) == 16
+    wheels, pf = (faulty_run(cell) for cell in noisy if cell.seed == 1)
+    clean = open_run(noisy[0].run, noisy[0].folder)
+    assert wheels.measurements == pf.measurements != clean.measurements
+    assert wheels.truth is clean.truth
+
+
+def test_log_is_told_by_its_content_not_by_its_name(tmp_path):
+    simulate("paper_office", tmp_path / "a.mcap", seed=1, duration_s=10.0)
+    (tmp_path / "b.mcap").write_bytes((tmp_path / "a.mcap").read_bytes())
+    text = SUITE.replace('scenario = "paper_office"\nduration_s = 20.0', 'mcap = "a.mcap"')
+    text = text.replace('scenario = "paper_mec"\nseed = 3\nduration_s = 20.0', 'mcap = "b.mcap"')
+    (tmp_path / "logs.toml").write_text(text, encoding="utf-8")
+    cells = cells_of(load_suite(tmp_path / "logs.toml"), Store(tmp_path / "store"))
+    assert [cell.estimate_key for cell in cells[:4]] == [cell.estimate_key for cell in cells[4:]]
+
+
+def test_cut_run_ends_where_it_is_cut(suite):
+    run = open_run(suite.runs[0], suite.folder)
+    assert max(measurement.time_ns for measurement in run.measurements) <= 20_000_000_000
+    assert run.truth.time_ns.max() <= 20_000_000_000
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('use = "particle"', 'use = "partcle"', "did you mean 'particle'"),
+        ('use = "particle"', 'use = "particle"\nparams = { particels = 3 }', "did you mean 'particles'"),
+        ("[[estimators]]", '[[faults]]\nid = "x"\napply = [{ kind = "dorp" }]\n[[estimators]]', "did you mean 'drop'"),
+        ('scenario = "paper_mec"\nseed = 3\nduration_s = 20.0', 'mcap = "none.mcap"', "none.mcap is not there"),
+    ],
+)
+def test_what_cannot_run_is_refused_before_any_work(tmp_path, old, new, message, capsys):
+    (tmp_path / "suite.toml").write_text(SUITE.replace(old, new, 1), encoding="utf-8")
+    assert main(["bench", "run", str(tmp_path / "suite.toml"), "--store", str(tmp_path / "store")]) == 1
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "store" / "estimates").exists()
+
+
+def test_runner_that_was_killed_leaves_a_store_that_is_gone_on_with(suite, tmp_path):
+    """SIGKILL as soon as the first estimate is there."""
+    store = Store(tmp_path / "store")
+    command = [sys.executable, "-m", "fusion.cli", "bench", "run", str(tmp_path / "small.toml")]
+    process = subprocess.Popen([*command, "--store", str(store.folder), "-j", "2"], stdout=subprocess.DEVNULL)
+    while not list(store.folder.glob("scores/*/*")):
+        assert process.poll() is None or process.returncode == 0
+        if process.poll() is not None:
+            break
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    results = run_suite(suite, store, workers=1)
+    assert digests(results) == digests(run_suite(suite, Store(tmp_path / "fresh"), workers=1))
+
+
+def test_plan_and_run_tell_what_they_did(suite, tmp_path, capsys):
+    words = [str(tmp_path / "small.toml"), "--store", str(tmp_path / "store")]
+    assert main(["bench", "plan", *words]) == 0
+    assert "2 runs x 2 estimators x 1 faults x 2 seeds = 8 cells" in capsys.readouterr().out
+    assert main(["bench", "run", *words, "-j", "1"]) == 0
+    told = capsys.readouterr()
+    assert "8 ok" in told.err
+    assert "clean: medians over cells" in told.out
+    assert main(["bench", "plan", *words, "--json"]) == 0
+    counts = json.loads(capsys.readouterr().out)
+    assert (counts["cells"], counts["cached"], counts["missing_estimates"]) == (8, 8, 0)
+
+
+def test_leaderboard_puts_a_lost_contestant_last_whatever_its_other_cells(suite, tmp_path):
+    results = run_suite(suite, Store(tmp_path / "store"), workers=1)
+    best = leaderboard(results).rows[0][0]
+    spoilt = [
+        result._replace(status="crashed") if result.cell.contestant.id == best and result.cell.seed == 0 else result
+        for result in results
+    ]
+    rows = leaderboard(spoilt).rows
+    assert rows[-1][0] == best
+    assert rows[-1][1] == "2/4"
+
+
+def test_results_of_cells_without_a_score_are_left_out(suite, tmp_path):
+    store = Store(tmp_path / "store")
+    assert read_results(cells_of(suite, store), store) == []
+
+
+def test_stored_metrics_are_the_numbers_of_the_score(suite, tmp_path):
+    results = run_suite(suite, Store(tmp_path / "store"), workers=1)
+    assert all(np.isfinite(result.metrics["pos_p75"]) for result in results)
+    assert all(result.metrics["availability"] == 1.0 for result in results)
+
+
+def test_missing_suite_is_one_sentence(tmp_path):
+    with pytest.raises(SuiteError, match="cannot be read"):
+        load_suite(tmp_path / "suite.toml")
