@@ -1,4 +1,4 @@
-"""What no filter can beat on one run: the posterior Cramer-Rao bound (Tichavsky, Muravchik & Nehorai 1998, eq. 21).
+"""What no filter can beat on one run: the posterior Cramer-Rao bound (Tichavsky, Muravchik & Nehorai 1998).
 
 For additive Gaussian noise the recursion of the information J is
 

@@ -29,6 +29,7 @@ VERBS = {
     "import": Verb("logs.importing", "turn a recording of another format into an MCAP log"),
     "export": Verb("logs.export", "turn a log into CSV or TUM files"),
     "info": Verb("logs.info", "what is in a log"),
+    "bound": Verb("benchmarks.site", "the least error any fix can have over a floor, and where an anchor helps most"),
     "bench": Verb("benchmarks.bench", "score estimators on recorded runs"),
     "replay": Verb("benchmarks.replay", "run one estimator over a log and record what it said"),
     "review": Verb("benchmarks.review", "see a run and its estimators in Rerun"),
