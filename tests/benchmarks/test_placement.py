@@ -13,11 +13,13 @@ from benchmarks.placement import (
     Grid,
     Readings,
     Spread,
+    _candidates,
     best_addition,
     best_move,
     default_step,
     error_map,
     losses,
+    new_anchor,
 )
 from fusion import Bounds, World
 
@@ -101,15 +103,19 @@ def test_anchor_in_the_wrong_place_is_the_one_to_move():
     assert found.anchor.id in {"ap0", "ap3"}
     assert found.anchor.x > 5.0
     assert found.anchor.y > 5.0
+    after = [found.anchor, *(anchor for anchor in world.anchors if anchor.id != found.anchor.id)]
+    assert found.spread.p95_m == pytest.approx(Spread.of(error_map(after, RANGES, places_of(world))).p95_m, rel=1e-9)
     assert found.spread.p95_m < Spread.of(error_map(world.anchors, RANGES, places_of(world))).p95_m
 
 
-def test_no_proposal_is_a_world_that_would_be_refused():
-    """Between two anchors the best third place must not be on their line, nor the best move of one onto it."""
-    world = floor(((2, 5), (8, 5)))
-    for proposal in (best_addition(world, RANGES, places_of(world)), best_move(world, RANGES, places_of(world))):
-        kept = [anchor for anchor in world.anchors if anchor.id != proposal.anchor.id]
-        rows = [{"id": anchor.id, "position_m": [anchor.x, anchor.y]} for anchor in (*kept, proposal.anchor)]
+@pytest.mark.parametrize("places", [((0, 0), (10, 0)), ((0, 0), (10, 5)), ((0, 0), (10, 0), (0, 10))])
+def test_no_place_is_tried_that_a_world_file_would_be_refused_for(places):
+    """On another anchor, or on the line of all the others: three of them lie on floor and edges that are tried."""
+    world = floor(places)
+    tried = list(_candidates(world.bounds, new_anchor(world), world.anchors))
+    assert len(tried) > 300
+    for place in tried[::7] + [each for each in tried if each.x == each.y or each.y in {0.0, 0.5 * each.x}]:
+        rows = [{"id": anchor.id, "position_m": [anchor.x, anchor.y]} for anchor in (*world.anchors, place)]
         assert len(World.from_table({"anchors": rows}).anchors) == len(rows)
 
 
