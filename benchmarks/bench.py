@@ -13,10 +13,11 @@ from typing import Any
 import fusion
 from benchmarks.arguments import at_least_one
 from benchmarks.cell import STATUSES, Cell, Score, cached_run, crashed, score_cell
+from benchmarks.output import write_json
 from benchmarks.progress import Progress, progress_bar
 from benchmarks.score import pool
 from benchmarks.workers import Loss, compute
-from fusion import FusionError, LogError, ParameterError
+from fusion import LogError, ParameterError
 from fusion.errors import did_you_mean
 
 POOLED = "all runs"
@@ -164,12 +165,4 @@ def remarks(scores: Sequence[Score]) -> list[str]:
 
 def write_records(scores: Sequence[Score], output: Path) -> None:
     """The records of `Score.record` as one JSON list; ``-`` is stdout."""
-    text = json.dumps([score.record() for score in scores], indent=1, allow_nan=False, default=str) + "\n"
-    if output == Path("-"):
-        sys.stdout.write(text)
-        return
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        output.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FusionError(f"{output}: scores cannot be written ({error.strerror}); give another place") from error
+    write_json(output, [score.record() for score in scores], indent=1)

@@ -1,7 +1,3 @@
-"""What no unbiased method can beat: the Cramer-Rao bound of a position fix from one reading of each anchor.
-
-Fisher's information of independent Gaussian readings is the sum of h hᵀ / sigma^2, h the derivative of the expected
-reading by the position (Patwari et al. 2003, section III, for signal strength). Priors and motion can do better.
 """What no unbiased method can beat: the Cramer-Rao bound of a position fix, at one place or at thousands at once.
 
 Fisher's information of independent Gaussian readings is the sum of h hᵀ / variance, h the derivatives of the expected
@@ -17,12 +13,6 @@ The bound is local: it says nothing of the mirror image that two anchors leave. 
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fusion import RssiReading, WifiScan, World, sightings
-
-Floats = NDArray[np.float64]
 import math
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
@@ -175,7 +165,6 @@ def dilution(anchors: Sequence[Anchor], places: Places) -> Dilution:
 def rssi_fix_bound(world: World, x: float, y: float, heading: float = 0.0) -> Floats:
     """Least covariance (2, 2) [m^2] of a position fix from one scan at a pose (map frame; [m], [rad]).
 
-    The noise is what the world says: shadowing, and a common error of each anchor's readings.
     The noise is what the world says: shadowing, a common error of each anchor's readings, and of the exponent.
 
     >>> square = [{"id": n, "position_m": p} for n, p in zip("abcd", ([0, 0], [10, 0], [10, 10], [0, 10]))]
@@ -184,13 +173,6 @@ def rssi_fix_bound(world: World, x: float, y: float, heading: float = 0.0) -> Fl
     >>> round(float(np.sqrt(np.trace(rssi_fix_bound(world, 5.0, 5.0)))), 6)
     2.170898
     """
-    scan = WifiScan(0, "", 0, tuple(RssiReading(anchor.id, 0.0) for anchor in world.anchors))
-    information = np.zeros((2, 2))
-    for sighting in sightings(world, scan):
-        expected = sighting.expect(x, y, heading, world.robot.antenna_m)
-        slope = np.array([expected.by_x, expected.by_y])
-        information += np.outer(slope, slope) / (sighting.variance + sighting.model.bias_std**2)
-    return np.asarray(np.linalg.inv(information))
     places = Places.of_poses(world, x, y, heading)
     return fix_covariance(anchor_information(world.anchors, places, "rssi").sum(axis=0))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import html
-from pathlib import Path
 
 from fusion import FusionError
 
@@ -35,12 +34,3 @@ def as_html(title: str, markdown: str) -> bytes:
 def inline_png(picture: bytes) -> str:
     """A PNG as an address that holds it."""
     return "data:image/png;base64," + base64.b64encode(picture).decode()
-
-
-def write(path: Path, content: bytes) -> None:
-    """Raises `FusionError` where that cannot be."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-    except OSError as error:
-        raise FusionError(f"{path}: cannot be written ({error.strerror}); give another place") from error

@@ -10,9 +10,10 @@ from typing import get_args
 
 from benchmarks.arguments import at_least_one
 from benchmarks.bound import Radio
+from benchmarks.plotting import require_matplotlib
 from benchmarks.progress import progress_bar
 from benchmarks.sheet import print_sheets
-from benchmarks.site_picture import draw, require_matplotlib
+from benchmarks.site_picture import draw
 from benchmarks.site_plan import LIMIT_M, plan_site
 from benchmarks.site_report import sheets, write_record
 

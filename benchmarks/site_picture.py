@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.bound import Floats
+from benchmarks.output import write
 from benchmarks.placement import Proposal
+from benchmarks.plotting import as_png, require_matplotlib
 from benchmarks.site_plan import Plan, title
-from fusion import FusionError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.patheffects import AbstractPathEffect
 
-DOTS_PER_INCH = 120
 WIDTH_IN = 9.0
 COLOURS = "viridis"
 UNDEFINED = "0.75"
@@ -31,22 +31,10 @@ PROPOSED = "#d55e00"
 """Vermillion of Okabe & Ito (2008): apart from every colour of the map."""
 
 
-def require_matplotlib() -> None:
-    """Raises `FusionError` with the remedy where it is missing."""
-    try:
-        import matplotlib  # noqa: F401 - asked for
-    except ImportError as error:
-        raise FusionError("pictures need matplotlib; pip install 'fusion-localization[plots]'") from error
-
-
 def draw(plan: Plan, output: Path) -> None:
     """Write the map as a PNG, the same bytes for the same plan and version of matplotlib; raises `FusionError`."""
     require_matplotlib()
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        picture(plan).savefig(output, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
-    except OSError as error:
-        raise FusionError(f"{output}: the map cannot be written ({error.strerror}); give another place") from error
+    write(output, as_png(picture(plan)))
 
 
 def picture(plan: Plan) -> Figure:

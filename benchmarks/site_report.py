@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from benchmarks.output import write_json
 from benchmarks.placement import Proposal, Spread
 from benchmarks.sheet import Sheet
 from benchmarks.site_plan import Plan, title
-from fusion import FusionError
 
 
 def sheets(plan: Plan) -> list[Sheet]:
@@ -115,12 +113,4 @@ def _finite(value: float) -> float | None:
 
 def write_record(plan: Plan, output: Path) -> None:
     """The record as JSON; ``-`` is stdout."""
-    text = json.dumps(record(plan), allow_nan=False) + "\n"
-    if output == Path("-"):
-        sys.stdout.write(text)
-        return
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        output.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FusionError(f"{output}: the plan cannot be written ({error.strerror}); give another place") from error
+    write_json(output, record(plan))

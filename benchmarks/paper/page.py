@@ -7,7 +7,8 @@ from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 
-from benchmarks.page import as_html, inline_png, write
+from benchmarks.output import write
+from benchmarks.page import as_html, inline_png
 from benchmarks.paper.assumptions import MAIN, PREMISE
 from benchmarks.paper.claims import NOT_REPRODUCED, REPRODUCED
 from benchmarks.paper.figures import FIGURES

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.arguments import at_least_one
-from benchmarks.page import write
+from benchmarks.output import write_json
 from benchmarks.paper.calibrated import write_calibrated
 from benchmarks.paper.experiment import run_experiments
 from benchmarks.paper.page import write_html, write_markdown, write_png
@@ -93,7 +92,7 @@ def _writers(arguments: argparse.Namespace) -> list[tuple[Path, Callable[[Report
 
 
 def _write_json(report: Report, path: Path) -> None:
-    write(path, (json.dumps(report.record(), allow_nan=False) + "\n").encode())
+    write_json(path, report.record())
 
 
 def _tell(what: str) -> None:

@@ -231,7 +231,7 @@ def test_filter_that_models_everything_reaches_the_bound():
     for seed in range(40):
         run = noisy(seed)
         instants, lane = evaluation_instants(run.truth), run_lane(run, "ekf", {"gate_probability": 1.0})
-        answers = match(instants, lane.updates)
+        answers = match(instants, lane.track)
         errors.append(np.hypot(answers.x - instants.x, answers.y - instants.y)[1:])
         bounds.append(posterior_bound(run).error_m[1:])
     assert 0.94 < eff_pcrlb(np.array(errors), np.array(bounds)) < 1.06

@@ -199,4 +199,4 @@ def test_source_that_is_not_there_is_named(tmp_path):
 
 def test_record_that_cannot_be_written_is_told(hall, tmp_path, capsys):
     assert main(["bound", str(hall), "--step", "2", "--json", str(tmp_path)]) == 1
-    assert "the plan cannot be written" in capsys.readouterr().err
+    assert "cannot be written" in capsys.readouterr().err
