@@ -48,6 +48,10 @@ class LinearDistance(NamedTuple):
             return 0.0
         return self.scale * measured_m + (self.offset_m if measured_m > 0.0 else -self.offset_m)
 
+    def true_step(self, measured_m: float, *, moving: bool) -> float:
+        """True length [m] of one step of a move: the offset counts once, where the move begins (``moving`` False)."""
+        return self.scale * measured_m if moving else self.true_distance(measured_m)
+
 
 def wheel_increment(robot: Robot, rolled_m: Sequence[float]) -> tuple[float, float]:
     """Path length [m] and turn [rad] from the distance each wheel rolled [m], in the wheel order of `World`.
@@ -186,9 +190,7 @@ class Odometer:
         if max(map(abs, rolled)) > MAX_WHEEL_SPEED_M_S * max(seconds(span_ns), 0.1):
             return counted, ()
         distance, turn = wheel_increment(self.robot, rolled)
-        distance *= self._distance.scale
-        if distance and not state.moving:
-            distance += self._distance.offset_m if distance > 0.0 else -self._distance.offset_m
+        distance = self._distance.true_step(distance, moving=state.moving)
         counted = counted._replace(moving=bool(distance))
         return self._real(
             counted, Odometry(ticks.time_ns, ticks.sensor, ticks.seq, state.last_ns, distance, wrap_angle(turn))

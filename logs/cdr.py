@@ -42,7 +42,7 @@ class Unpacker:
     """Takes one message apart, in the order of its fields; raises `struct.error` or `ValueError` when it is cut off."""
 
     def __init__(self, message: bytes) -> None:
-        if message[:4] != HEADER:
+        if message[:2] != HEADER[:2]:  # the two bytes after it are options, and say at most how much padding follows
             raise ValueError(f"not little-endian CDR: starts with {message[:4].hex()}")
         self._body = memoryview(message)[4:]
         self._at = 0
@@ -56,6 +56,11 @@ class Unpacker:
         values = struct.unpack_from(f"<{count}{code}", self._body, self._at)
         self._at += count * size
         return values
+
+    @property
+    def left(self) -> int:
+        """Bytes not yet taken."""
+        return len(self._body) - self._at
 
     def whole(self, code: str = "I") -> int:
         """One integer."""

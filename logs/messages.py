@@ -83,7 +83,8 @@ def _stamped(time_ns: int, frame_id: str) -> Packer:
     return Packer().put("i", sec).put("I", nanosec).text(frame_id)
 
 
-def _header(cursor: Unpacker) -> tuple[int, str]:
+def take_header(cursor: Unpacker) -> tuple[int, str]:
+    """Time [ns] and frame of a std_msgs/Header."""
     sec, nanosec = cursor.whole("i"), cursor.whole("I")
     return sec * NANOSECONDS + nanosec, cursor.text()
 
@@ -99,9 +100,14 @@ def _put_pose(message: Packer, pose: Pose, *, heading_known: bool = True) -> Pac
     return message.put("d", pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
 
 
-def _take_pose(cursor: Unpacker) -> tuple[Pose, bool]:
-    """The pose and whether its heading is known."""
-    x, y, _, qx, qy, qz, qw = cursor.take("d", 7)
+def take_pose(cursor: Unpacker) -> tuple[Pose, bool]:
+    """A geometry_msgs/Pose (or Transform) on the floor, and whether its heading is known."""
+    x, y, _, *xyzw = cursor.take("d", 7)
+    return planar(x, y, *xyzw)
+
+
+def planar(x: float, y: float, qx: float, qy: float, qz: float, qw: float) -> tuple[Pose, bool]:
+    """What a pose in space is on the floor, and whether its heading is known: the yaw of a unit quaternion."""
     heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
     return Pose(x, y, heading), any((qx, qy, qz, qw))
 
@@ -130,7 +136,7 @@ def _encode_ticks(value: WheelTicks) -> bytes:
 
 def _decode_ticks(data: bytes, seq: int) -> WheelTicks:
     cursor = Unpacker(data)
-    time_ns, sensor = _header(cursor)
+    time_ns, sensor = take_header(cursor)
     counts = cursor.take("q", cursor.whole())
     return WheelTicks(time_ns, sensor, seq, tuple(int(count) for count in counts))
 
@@ -142,7 +148,7 @@ def _encode_command(value: MotorCommand) -> bytes:
 
 def _decode_command(data: bytes, seq: int) -> MotorCommand:
     cursor = Unpacker(data)
-    time_ns, sensor = _header(cursor)
+    time_ns, sensor = take_header(cursor)
     return MotorCommand(time_ns, sensor, seq, cursor.take("d", cursor.whole()))
 
 
@@ -153,7 +159,7 @@ def _encode_odometry(value: Odometry) -> bytes:
 
 def _decode_odometry(data: bytes, seq: int) -> Odometry:
     cursor = Unpacker(data)
-    time_ns, sensor = _header(cursor)
+    time_ns, sensor = take_header(cursor)
     from_ns = cursor.whole("q")
     distance_m, turn_rad = cursor.take("d", 2)
     return Odometry(time_ns, sensor, seq, from_ns, distance_m, turn_rad, bool(cursor.whole("?")))
@@ -168,8 +174,11 @@ def _encode_gyro(value: Gyro) -> bytes:
 
 def _decode_gyro(data: bytes, seq: int) -> Gyro:
     cursor = Unpacker(data)
-    time_ns, sensor = _header(cursor)
-    return Gyro(time_ns, sensor, seq, cursor.take("d", 16)[15])
+    time_ns, sensor = take_header(cursor)
+    *_, rate_rad_s, first_covariance = cursor.take("d", 17)
+    if first_covariance == NOT_GIVEN:
+        raise ValueError("the message says that it measures no turn rate")
+    return Gyro(time_ns, sensor, seq, rate_rad_s)
 
 
 def _encode_scan(value: WifiScan) -> bytes:
@@ -181,7 +190,7 @@ def _encode_scan(value: WifiScan) -> bytes:
 
 def _decode_scan(data: bytes, seq: int) -> WifiScan:
     cursor = Unpacker(data)
-    time_ns, sensor = _header(cursor)
+    time_ns, sensor = take_header(cursor)
     readings = (RssiReading(cursor.text(), cursor.take("d", 1)[0], cursor.whole("q")) for _ in range(cursor.whole()))
     return WifiScan(time_ns, sensor, seq, tuple(readings))
 
@@ -195,7 +204,7 @@ def _encode_ranges(value: Ranges) -> bytes:
 
 def _decode_ranges(data: bytes, seq: int) -> Ranges:
     cursor = Unpacker(data)
-    time_ns, sensor = _header(cursor)
+    time_ns, sensor = take_header(cursor)
     readings = []
     for _ in range(cursor.whole()):
         anchor, (range_m, std_m) = cursor.text(), cursor.take("d", 2)
@@ -237,8 +246,8 @@ def encode_truth(truth: Truth) -> bytes:
 def decode_truth(data: bytes) -> Truth:
     """Ground truth from its message."""
     cursor = Unpacker(data)
-    time_ns, _ = _header(cursor)
-    pose, has_heading = _take_pose(cursor)
+    time_ns, _ = take_header(cursor)
+    pose, has_heading = take_pose(cursor)
     return Truth(time_ns, pose.x, pose.y, pose.heading if has_heading else None)
 
 
@@ -256,8 +265,8 @@ def encode_prior(prior: Prior) -> tuple[bytes, dict[str, str]]:
 def decode_prior(data: bytes, about: Mapping[str, str]) -> Prior:
     """The starting pose from its message and the log's metadata, which wins where it tells more."""
     cursor = Unpacker(data)
-    time_ns, _ = _header(cursor)
-    pose, has_heading = _take_pose(cursor)
+    time_ns, _ = take_header(cursor)
+    pose, has_heading = take_pose(cursor)
     covariance = _take_covariance(cursor)
     if covariance is None:
         raise ValueError("the prior states no covariance")
@@ -275,8 +284,8 @@ def encode_estimate(estimate: Estimate) -> bytes:
 def decode_estimate(data: bytes) -> Estimate:
     """An estimate from its message."""
     cursor = Unpacker(data)
-    time_ns, _ = _header(cursor)
-    pose, has_heading = _take_pose(cursor)
+    time_ns, _ = take_header(cursor)
+    pose, has_heading = take_pose(cursor)
     return Estimate(time_ns, pose, _take_covariance(cursor), heading_known=has_heading)
 
 

@@ -1,43 +1,38 @@
-"""Reads a log back as a `Run`, whole or cut short.
-
-A file that a crash cut off opens all the same: everything up to the last closed chunk is there, and a warning says
-what is missing. The package's own message iterators answer such a file with nothing at all, hence the walk over raw
-records.
-"""
+"""Reads a log of ours back as a `Run`, whole or cut short."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+
+from mcap.records import Message
 
 from fusion import Estimate, FusionError, LogError, Measurement, Prior, Truth, World
 from logs import messages
 from logs.messages import DECODERS, ESTIMATE_TOPIC, FATES_TOPIC
 from logs.run import Run, TruthTrack
+from logs.walk import Walk
 from logs.writer import RUN_RECORD
-
-MAGIC = b"\x89MCAP0\r\n"
 
 
 @dataclass
 class _Contents:
     """What the walk over a file has found so far."""
 
-    record: dict[str, str] = field(default_factory=dict)
+    record: dict[str, str]
     measurements: list[tuple[int, Measurement]] = field(default_factory=list)
     truths: list[Truth] = field(default_factory=list)
     prior: Prior | None = None
     lanes: dict[str, list[Estimate]] = field(default_factory=dict)
     unreadable: dict[str, int] = field(default_factory=dict)
     foreign: dict[str, int] = field(default_factory=dict)
-    damage: str = ""
 
 
 def read_run(path: Path) -> Run:
     """The run in the log at ``path``; raises `LogError` for a file that holds none."""
-    contents = _walk(path)
+    walk = Walk(path)
+    contents = _contents(walk)
     world = _world(path, contents)
     if not (contents.measurements or contents.truths or contents.lanes):
         raise LogError(f"{path}: holds no messages, or none that can be read; record or import it again")
@@ -50,7 +45,7 @@ def read_run(path: Path) -> Run:
         metadata={key: value for key, value in contents.record.items() if key != "world"},
         measurements=tuple(measurement for _, measurement in contents.measurements),
         truth=TruthTrack.from_truths(contents.truths) if contents.truths else None,
-        warnings=_warnings(path, contents, world),
+        warnings=(*walk.warnings, *_warnings(path, contents, world)),
         lanes={name: tuple(estimates) for name, estimates in contents.lanes.items()},
     )
 
@@ -60,7 +55,7 @@ def _world(path: Path, contents: _Contents) -> World:
     if "world" not in contents.record:
         topics = ", ".join(contents.foreign) or "nothing readable"
         raise LogError(
-            f"{path}: holds no world ({topics}); record it with fusion, or bring it in with `fusion import csv`"
+            f"{path}: holds no world ({topics}); record it with fusion, or bring it in with `fusion import rosbag`"
         )
     try:
         return World.from_table(json.loads(contents.record["world"]))
@@ -68,47 +63,21 @@ def _world(path: Path, contents: _Contents) -> World:
         raise LogError(f"{path}: the world stored in it cannot be read ({error}); record or import it again") from error
 
 
-def _walk(path: Path) -> _Contents:
-    from mcap.records import Channel, Message, Metadata, Schema
-    from mcap.stream_reader import StreamReader
+def holds_run(path: Path) -> bool:
+    """Whether the file is a log of ours: it says so before its first message. Raises `LogError` for no MCAP file."""
+    walk = Walk(path)
+    next(iter(walk), None)
+    return "world" in walk.metadata.get(RUN_RECORD, {})
 
-    contents = _Contents()
-    schemas: dict[int, str] = {}
-    channels: dict[int, tuple[str, str]] = {}
-    with _open(path) as stream:
-        size = path.stat().st_size
-        readable = len(MAGIC)
-        try:
-            for record in StreamReader(stream, validate_crcs=True, record_size_limit=size).records:
-                readable = stream.tell()
-                if isinstance(record, Message):
-                    _take(contents, *channels[record.channel_id], record)
-                elif isinstance(record, Schema):
-                    schemas[record.id] = record.name
-                elif isinstance(record, Channel):
-                    channels[record.id] = (record.topic, schemas.get(record.schema_id, ""))
-                elif isinstance(record, Metadata) and record.name == RUN_RECORD:
-                    contents.record.update(record.metadata)
-        except Exception as error:  # noqa: BLE001 - damage shows in any of a dozen ways, and all mean "nothing further"
-            contents.damage = f"the last {size - readable} of its {size} bytes ({type(error).__name__})"
+
+def _contents(walk: Walk) -> _Contents:
+    contents = _Contents(walk.metadata.setdefault(RUN_RECORD, {}))
+    for source, message in walk:
+        _take(contents, source.topic, source.type, message)
     return contents
 
 
-def _open(path: Path) -> Any:  # noqa: ANN401 - a binary stream
-    try:
-        stream = path.open("rb")
-    except OSError as error:
-        raise LogError(f"{path}: cannot be opened ({error.strerror}); check the path") from error
-    start = stream.read(len(MAGIC))
-    stream.seek(0)
-    if start != MAGIC:
-        stream.close()
-        what = "is empty" if not start else "is no MCAP file"
-        raise LogError(f"{path}: {what}; give a log, or bring a recording in with `fusion import`")
-    return stream
-
-
-def _take(contents: _Contents, topic: str, schema: str, message: Any) -> None:  # noqa: ANN401 - an MCAP message
+def _take(contents: _Contents, topic: str, schema: str, message: Message) -> None:
     """Sort one message into the contents; one that cannot be decoded is counted, not fatal."""
     try:
         if topic == messages.TRUTH[0]:
@@ -128,8 +97,6 @@ def _take(contents: _Contents, topic: str, schema: str, message: Any) -> None:  
 
 def _warnings(path: Path, contents: _Contents, world: World) -> tuple[str, ...]:
     found = []
-    if contents.damage:
-        found.append(f"{path}: cut off or damaged, {contents.damage} cannot be read; what stands before is used")
     if contents.record.get("world_hash", world.hash) != world.hash:
         found.append(f"{path}: the world stored in it is not the one it was written with; its hash differs")
     found += [f"{path}: {count} messages of {topic} cannot be decoded" for topic, count in contents.unreadable.items()]
