@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import importlib
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from fusion.errors import RecordingError, did_you_mean
+from fusion.errors import ParameterError, RecordingError, did_you_mean
 
 KINDS = {
     "csv": "logs.csv_bundle",
@@ -16,21 +18,30 @@ KINDS = {
     "cdoa": "logs.cdoa",
     "kolakowski": "logs.kolakowski",
     "haiyao": "logs.haiyao",
+    "rosbag": "logs.rosbag",
 }
 """Kinds of recordings and the module that reads each; one has ``recordings(folder)``."""
+OPEN = "rosbag"
+"""The kind that does not say by itself what is what: its ``recordings`` takes options, and a file will do."""
 
 
-def import_recordings(kind: str, folder: Path, output: Path) -> list[Path]:
+def import_recordings(kind: str, folder: Path, output: Path, **options: Any) -> list[Path]:  # noqa: ANN401 - a kind's
     """Write every run found in ``folder`` as a log; answers their paths.
 
     ``output`` ending in ``.mcap`` is one log, and the folder must hold one run; else a folder that gets one log a run.
-    Raises `RecordingError` for an unknown kind, a folder without such files, or a file that cannot be understood.
+    The kind `rosbag` takes a file as well, and the ``options`` of `logs.rosbag.recordings`. What is lost or doubtful is
+    told on stderr. Raises `RecordingError` for an unknown kind, a folder without such files, or a file that cannot be
+    understood, `ParameterError` for options that the kind does not take.
     """
     if kind not in KINDS:
         raise RecordingError(f"there is no importer {kind!r}; {did_you_mean(kind, KINDS)}")
-    if not folder.is_dir():
+    if options and kind != OPEN:
+        raise ParameterError(f"{kind} takes no {', '.join(sorted(options))}: its files say it; only {OPEN} does")
+    if not folder.is_dir() and not (kind == OPEN and folder.is_file()):
         raise RecordingError(f"{folder}: no such folder; give the folder that holds the recording")
-    found = list(importlib.import_module(KINDS[kind]).recordings(folder))
+    found = list(importlib.import_module(KINDS[kind]).recordings(folder, **options))
+    for warning in (warning for recording in found for warning in recording.warnings):
+        sys.stderr.write(f"warning: {warning}\n")
     if output.suffix != ".mcap":
         return [recording.write(output / f"{recording.name}.mcap") for recording in found]
     if len(found) != 1:
@@ -42,7 +53,7 @@ def import_recordings(kind: str, folder: Path, output: Path) -> list[Path]:
 def configure(parser: argparse.ArgumentParser) -> None:
     """Arguments of `fusion import`."""
     parser.add_argument("kind", metavar="KIND", help=f"what wrote the recording: {', '.join(KINDS)}")
-    parser.add_argument("folder", metavar="FOLDER", type=Path, help="the folder with its files")
+    parser.add_argument("folder", metavar="FOLDER", type=Path, help="the folder with its files; a bag may be a file")
     parser.add_argument(
         "-o",
         "--output",
@@ -51,10 +62,45 @@ def configure(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="a log (*.mcap), or a folder for one log per run",
     )
+    bag = parser.add_argument_group("rosbag only")
+    bag.add_argument("--world", metavar="WORLD.toml", type=Path, help="the anchors and the robot")
+    bag.add_argument(
+        "--topic",
+        metavar="ROLE=TOPIC",
+        action="append",
+        default=[],
+        help="odom, wheels, gyro, range, range.ANCHOR, wifi or truth, and its topic; may be repeated",
+    )
+    bag.add_argument(
+        "--truth-to-map",
+        metavar=("X", "Y", "HEADING"),
+        type=float,
+        nargs=3,
+        help="where the origin of the truth's frame is in the map [m, m, rad]",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Import and list what was written."""
-    for path in import_recordings(arguments.kind, arguments.folder, arguments.output):
+    given = {
+        "world": arguments.world,
+        "topics": _topics(arguments.topic),
+        "truth_to_map": arguments.truth_to_map,
+    }
+    options = {name: value for name, value in given.items() if value}
+    for path in import_recordings(arguments.kind, arguments.folder, arguments.output, **options):
         sys.stdout.write(f"{path}\n")
     return 0
+
+
+def _topics(texts: Sequence[str]) -> dict[str, str]:
+    """Roles and their topics, as ``ROLE=TOPIC``."""
+    topics: dict[str, str] = {}
+    for text in texts:
+        role, equals, topic = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise ParameterError(f"--topic {text}: names no topic; write ROLE=TOPIC, as in odom=/odom")
+        if role in topics:
+            raise ParameterError(f"--topic {text}: {role} is {topics[role]} already; give each role once")
+        topics[role] = topic
+    return topics

@@ -37,15 +37,24 @@ class Recording:
     measurements: Sequence[Measurement]
     truths: Sequence[Truth]
     metadata: Mapping[str, str] = field(default_factory=dict)
+    arrivals_ns: Sequence[int] | None = None
+    """When each measurement, and then each truth, arrived; None: when it was true."""
+    warnings: Sequence[str] = ()
+    """What is lost or doubtful, in sentences."""
 
     def write(self, path: Path) -> Path:
-        """Write it as a log, in time order."""
-        rows: list[tuple[tuple[int, int, str, int], Measurement | Truth]] = [(order(m), m) for m in self.measurements]
-        rows += [((truth.time_ns, 2, "", i), truth) for i, truth in enumerate(self.truths)]
-        rows.sort(key=lambda row: row[0])
+        """Write it as a log, in the order of arrival."""
+        values: list[Measurement | Truth] = [*self.measurements, *self.truths]
+        keys = [order(m) for m in self.measurements]
+        keys += [(truth.time_ns, 2, "", i) for i, truth in enumerate(self.truths)]
+        arrivals = [value.time_ns for value in values] if self.arrivals_ns is None else self.arrivals_ns
+        rows = sorted(zip(arrivals, keys, values, strict=True), key=lambda row: row[:2])
         with RunWriter(path, self.world, name=self.name, prior=self.prior, metadata=self.metadata) as log:
-            for _, row in rows:
-                log.write_truth(row) if isinstance(row, Truth) else log.write(row)
+            for arrived_ns, _, value in rows:
+                if isinstance(value, Truth):
+                    log.write_truth(value, log_time_ns=arrived_ns)
+                else:
+                    log.write(value, log_time_ns=arrived_ns)
         return path
 
 

@@ -73,9 +73,10 @@ class RunWriter:
         log_ns = measurement.time_ns if log_time_ns is None else log_time_ns
         self._add(kind.topic, kind.schema, log_ns, measurement.time_ns, measurement.seq, kind.encode(measurement))
 
-    def write_truth(self, truth: Truth) -> None:
-        """Append where the robot really was."""
-        self._add(*messages.TRUTH, truth.time_ns, truth.time_ns, 0, messages.encode_truth(truth))
+    def write_truth(self, truth: Truth, *, log_time_ns: int | None = None) -> None:
+        """Append where the robot really was; ``log_time_ns`` says when that arrived, if not when it was true."""
+        log_ns = truth.time_ns if log_time_ns is None else log_time_ns
+        self._add(*messages.TRUTH, log_ns, truth.time_ns, 0, messages.encode_truth(truth))
 
     def write_update(self, lane: str, update: Update) -> None:
         """Append what an estimator said: its estimate (if valid) and the fates of the readings."""

@@ -57,3 +57,40 @@ def test_file_that_is_no_log_is_one_sentence_and_exit_1(tmp_path, capsys):
     assert main(["info", str(tmp_path / "odd.mcap")]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert "is no MCAP file" in line
+
+
+def test_foreign_bag_is_told_topic_by_topic_with_the_roles_each_could_play(tmp_path, ros, capsys):
+    rows = [("/odom", t * SECOND, ros.odometry(t * SECOND, 0.0, 0.0, 0.0)) for t in range(5)]
+    rows += [
+        (
+            "/tf",
+            SECOND,
+            ros.transforms((SECOND, "map", "odom", 0.0, 0.0, 0.0), (SECOND, "odom", "base", 0.0, 0.0, 0.0)),
+        ),
+        ("/uwb", 2 * SECOND, ros.range(2 * SECOND, "a", 1.0)),
+        ("/uwb", 4 * SECOND, ros.range(4 * SECOND, "b", 1.0)),
+        ("/chatter", SECOND, ros.make("std_msgs/msg/String", "hello")),
+    ]
+    bag = ros.bag(tmp_path / "walk", rows)
+    about = describe(bag)
+    odom, tf, uwb, chatter = about["topics"]
+    assert (about["name"], about["duration_s"], about["warnings"]) == ("walk", 4.0, [])
+    assert (odom["type"], odom["count"], odom["rate_hz"]) == ("nav_msgs/msg/Odometry", 5, 1.0)
+    assert (odom["roles"], tf["roles"], uwb["roles"], chatter["roles"]) == (["odom", "truth"], ["truth"], ["range"], [])
+    assert (tf["names"], uwb["names"]) == (["map>odom", "odom>base"], ["a", "b"])
+    assert (uwb["rate_hz"], tf["rate_hz"]) == (0.5, None)
+    (file,) = bag.glob("*.mcap")
+    assert main(["info", str(file), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["topics"] == about["topics"]
+    assert main(["info", str(bag)]) == 0
+    text = capsys.readouterr().out
+    assert "could be odom or truth" in text
+    assert "(map>odom, odom>base)" in text
+    assert "fusion import rosbag" in text
+
+
+def test_foreign_bag_cut_off_is_told_with_what_cannot_be_read(tmp_path, ros, capsys):
+    (file,) = ros.bag(tmp_path / "walk", [("/imu", SECOND, ros.imu(SECOND, 0.5))]).glob("*.mcap")
+    file.write_bytes(file.read_bytes()[:-30])
+    assert main(["info", str(file)]) == 0
+    assert "warning: " in capsys.readouterr().out
