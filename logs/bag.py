@@ -21,6 +21,8 @@ from logs.walk import Source, Walk
 
 Keep = Callable[[str, Sample], bool]
 NEEDS_PROTOBUF = "its protobuf messages need the package protobuf; pip install 'fusion-localization[foxglove]'"
+FOXGLOVE = ("json", "protobuf")
+"""How messages of Foxglove's types are packed."""
 TRANSFORM_TYPES = (TRANSFORMS, foxglove.TRANSFORM, foxglove.TRANSFORMS)
 
 
@@ -43,6 +45,11 @@ class Topic:
     """What must be installed before its messages can be read."""
 
     @property
+    def understood(self) -> bool:
+        """Whether messages of its type are read here, packed as they are."""
+        return self.type in (CDR if self.encoding == "cdr" else foxglove.READERS if self.encoding in FOXGLOVE else ())
+
+    @property
     def rate_hz(self) -> float | None:
         """Messages per second of log time; None for one message, or all at once."""
         span_s = seconds(self.last_ns - self.first_ns)
@@ -57,7 +64,7 @@ class Bag:
     topics: dict[str, Topic] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     """What of its files could not be read."""
-    decoders: dict[Source, Decoder | None] = field(default_factory=dict, repr=False)
+    decoders: dict[Source, Decoder] = field(default_factory=dict, repr=False)
 
     def topic(self, source: Source) -> Topic:
         """The topic of a source, new if it was not met yet."""
@@ -80,14 +87,13 @@ class Bag:
             topic.unreadable += 1
 
     def _decoded(self, topic: Topic, source: Source, data: bytes) -> Iterable[Sample]:
-        if topic.missing:
+        if topic.missing or not topic.understood:
             return ()
-        if source.type != topic.type:
+        if (source.type, source.encoding) != (topic.type, topic.encoding):
             raise ValueError(f"the topic changes from {topic.type} to {source.type}")
         if source not in self.decoders:
             self.decoders[source] = _decoder(source)
-        decode = self.decoders[source]
-        return decode(data) if decode else ()
+        return self.decoders[source](data)
 
 
 def open_bag(path: Path, *, keep: Keep) -> Bag:
@@ -113,15 +119,13 @@ def _files(path: Path) -> list[Path]:
     return files
 
 
-def _decoder(source: Source) -> Decoder | None:
-    """How its messages are read; None for a type that is of no use here."""
+def _decoder(source: Source) -> Decoder:
+    """How the messages of an understood topic are read."""
     if source.encoding == "cdr":
-        return CDR.get(source.type)
-    if source.type in foxglove.READERS and source.encoding == "json":
+        return CDR[source.type]
+    if source.encoding == "json":
         return foxglove.json_decoder(source.type)
-    if source.type in foxglove.READERS and source.encoding == "protobuf":
-        return foxglove.protobuf_decoder(source.type, source.definition)
-    return None
+    return foxglove.protobuf_decoder(source.type, source.definition)
 
 
 def _names(kind: str, sample: Sample) -> Iterable[str]:

@@ -63,8 +63,7 @@ class Cast:
 
 def roles_of(topic: Topic) -> list[str]:
     """The roles that a topic could play, going by its type."""
-    readable = topic.encoding == "cdr" or topic.type in foxglove.READERS
-    return [role for role, kinds in ROLES.items() if readable and topic.type in kinds]
+    return [role for role, kinds in ROLES.items() if topic.understood and topic.type in kinds]
 
 
 def truth_frames(topics: Mapping[str, str]) -> tuple[str, str] | None:
@@ -90,7 +89,7 @@ def assign(bag: Bag, world: World, topics: Mapping[str, str]) -> Cast:
     for name in cast.used:
         if cast.used.count(name) > 1:
             raise ParameterError(f"{bag.path}: {name} is named for two roles; each needs a topic of its own")
-    free = [topic for topic in bag.topics.values() if topic.count and topic.name not in cast.used]
+    free = [topic for topic in bag.topics.values() if topic.count and topic.understood and topic.name not in cast.used]
     _find(cast, bag, world, topics, free)
     if "wheels" in cast.topics:
         cast.joints = wheel_joints(cast.topics["wheels"], cast.joints, world.robot)
@@ -132,6 +131,8 @@ def _named(bag: Bag, role: str, name: str, kinds: tuple[str, ...]) -> Topic:
         raise ParameterError(f"{bag.path}: truth: {name} holds transforms ({pairs}); say which, as tf:map>base_link")
     if topic.type not in kinds:
         raise ParameterError(f"{bag.path}: {role}: {name} is of the type {topic.type}, and not {' or '.join(kinds)}")
+    if not topic.understood:
+        raise ParameterError(f"{bag.path}: {role}: {name} is packed as {topic.encoding!r}, which is not read here")
     if topic.missing:
         raise ParameterError(f"{bag.path}: {role}: {name} cannot be read; {topic.missing}")
     if not topic.count:

@@ -154,6 +154,12 @@ def test_message_that_says_nothing_is_counted(tmp_path, encoding, damaged):
     assert "1 messages of /pose cannot be decoded" in run.warnings[0]
 
 
+def test_pose_packed_in_another_way_is_refused(tmp_path):
+    path = written(tmp_path / "run.mcap", "flatbuffer", "foxglove.PoseInFrame", b"")
+    with pytest.raises(ParameterError, match="/pose is packed as 'flatbuffer', which is not read here"):
+        read_bag(path, WORLD, {"truth": "/pose"})
+
+
 def test_bag_cut_in_half_keeps_what_stands_before(tmp_path):
     kind = "foxglove.PoseInFrame"
     path = written(tmp_path / "run.mcap", "json", kind, *(json_message(kind, T + i) for i in range(20)))
