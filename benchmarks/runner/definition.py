@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 
@@ -165,13 +165,14 @@ def _checked(written: _File, path: Path) -> Suite:
         _check_run(run, f"{path}: runs[{number}] ({run.id})")
     _check_head(head, f"{path}: suite")
     _check_tuning(written, path)
+    runs = tuple(replace(run, topics={**head.topics, **run.topics}) for run in written.runs)
     return Suite(
         head.name,
         head.seed,
         head.seeds,
         head.eval,
         head.limits,
-        written.runs,
+        runs,
         contestants,
         faults,
         written.gate,
@@ -190,6 +191,8 @@ def _require_unique(ids: Sequence[str], where: str) -> None:
 def _check_run(run: RunSource, where: str) -> None:
     if (run.mcap is None) == (run.scenario is None):
         raise SuiteError(f"{where}: give either mcap, a log, or scenario, a simulated run")
+    if run.topics and run.world is None:
+        raise SuiteError(f"{where}: topics are of a foreign bag, which needs a world too; our own logs need neither")
     if run.split not in ("tune", "test"):
         raise SuiteError(f"{where}: split is {run.split!r}; {did_you_mean(run.split, ('tune', 'test'))}")
 

@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 from benchmarks.runner.definition import RunSource
 from benchmarks.runner.store import Store, key_of, to_json
-from fusion import SuiteError
+from fusion import SuiteError, World
 from fusion.values import nanoseconds
 from logs.reader import read_run
+from logs.rosbag import read_bag
 from logs.run import Run, TruthTrack
 from sensors.scenario import load_scenario, scenario_text
 from sensors.simulate import simulated_run
@@ -43,12 +44,26 @@ def open_run(source: RunSource, folder: Path) -> Run:
     if source.scenario is not None:
         return _simulated(_scenario_place(source.scenario, folder), source.seed, source.duration_s)
     path = place_of(source, folder)
+    if source.world is not None:
+        topics = tuple(sorted(source.topics.items()))
+        return _bag(path, path.stat().st_mtime_ns, folder / source.world, topics, source.truth_to_map)
     return _read(path, path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=KEPT_RUNS)
 def _read(path: Path, _modified_ns: int) -> Run:
     return read_run(path)
+
+
+@lru_cache(maxsize=KEPT_RUNS)
+def _bag(
+    path: Path,
+    _modified_ns: int,
+    world: Path,
+    topics: tuple[tuple[str, str], ...],
+    truth_to_map: tuple[float, float, float],
+) -> Run:
+    return read_bag(path, World.load(world), dict(topics), truth_to_map=truth_to_map)
 
 
 @lru_cache(maxsize=KEPT_RUNS)
@@ -78,7 +93,15 @@ def content_of(source: RunSource, folder: Path, store: Store) -> Content:
     path = place_of(source, folder)
     status = path.stat()
     seen = key_of(
-        {"path": str(path), "size": status.st_size, "modified_ns": status.st_mtime_ns, "inode": status.st_ino}
+        {
+            "path": str(path),
+            "size": status.st_size,
+            "modified_ns": status.st_mtime_ns,
+            "inode": status.st_ino,
+            "read_as": [World.load(folder / source.world).table, dict(source.topics), source.truth_to_map]
+            if source.world
+            else None,
+        }
     )
     if not store.has("runs", seen):
         measured = content_of_run(open_run(source, folder))
