@@ -42,6 +42,10 @@ GROUPS = {
     "bench": {
         "plan": Verb("benchmarks.runner.plan_verb", "what a suite would compute, and what of it is there"),
         "run": Verb("benchmarks.runner.run_verb", "compute what is missing of a suite"),
+        "compare": Verb("benchmarks.runner.compare_verb", "which estimator is better, or that the runs cannot tell"),
+        "gate": Verb("benchmarks.runner.gate_verb", "may a change land? judged against a baseline"),
+        "verify": Verb("benchmarks.runner.verify_verb", "compute stored cells again, they must be the same"),
+        "export": Verb("benchmarks.runner.export_verb", "results for other programs"),
     },
 }
 """Verbs under verbs; without one of them the verb itself is meant (`fusion bench RUN`)."""
@@ -98,7 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(name: str, verb: Verb, words: Sequence[str]) -> int:
     module = importlib.import_module(verb.module)
-    parsed = _verb_parser(name, verb, module).parse_args(words)
+    parsed = _verb_parser(name, verb, module).parse_intermixed_args(words)
     try:
         return int(module.run(parsed))
     except FusionError as error:

@@ -8,13 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.runner.definition import CLEAN
+from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.execute import read_metrics
 from benchmarks.runner.plan import Cell
 from benchmarks.runner.store import Store
-from benchmarks.score import quantile
+from benchmarks.score import METRICS_VERSION, quantile
 from benchmarks.sheet import Sheet
 from benchmarks.table import COLUMNS, as_text
+from benchmarks.track import Floats
+from benchmarks.verdict import Comparison, compare
 
 RANKED_BY = "pos_p75"
 ALIVE = ("ok", "unscored")
@@ -71,3 +73,32 @@ def leaderboard(results: Sequence[Result], fault: str = CLEAN) -> Sheet:
         rows.append(((lost, medians.get(RANKED_BY, math.inf), name), (name, f"{len(own) - lost}/{len(own)}", *numbers)))
     head = ("position error of", "cells ok", *(column.title for column in shown))
     return Sheet(f"{fault}: medians over cells", head, tuple(row for _, row in sorted(rows)))
+
+
+def score_matrix(results: Sequence[Result], metric: str) -> Floats:
+    """One contestant's scores under one fault, (runs, seeds), both in the suite's order."""
+    runs = list(dict.fromkeys(result.cell.run.id for result in results))
+    rows = [[result.metrics.get(metric, math.inf) for result in results if result.cell.run.id == run] for run in runs]
+    return np.array([[math.inf if math.isnan(value) else value for value in row] for row in rows], dtype=np.float64)
+
+
+def comparison(results: Sequence[Result], metric: str = RANKED_BY, fault: str = CLEAN) -> Comparison:
+    """All pairs of contestants, the best first; raises `ParameterError` where they cannot be compared."""
+    grouped = by_contestant(results, fault)
+    order = sorted(grouped, key=lambda name: (median_metrics(grouped[name]).get(metric, math.inf), name))
+    return compare({name: score_matrix(grouped[name], metric) for name in order}, metric)
+
+
+def record(suite: Suite, results: Sequence[Result]) -> dict[str, object]:
+    """Everything for strict JSON, in SI units: what `bench gate` takes as a baseline. NaN and infinity are None."""
+    return {"suite": suite.name, "metrics_version": METRICS_VERSION, "results": [flat(result) for result in results]}
+
+
+def flat(result: Result) -> dict[str, object]:
+    """One result as one row."""
+    cell = result.cell
+    head = {"run": cell.run.id, "estimator": cell.contestant.id, "fault": cell.fault.id, "seed": cell.seed}
+    tail = {"status": result.status, "error": result.error, "digest": result.digest, "split": cell.run.split}
+    keys = {"estimate_key": cell.estimate_key, "score_key": cell.score_key}
+    numbers = {key: value if math.isfinite(value) else None for key, value in result.metrics.items()}
+    return {**head, **tail, **numbers, **keys}

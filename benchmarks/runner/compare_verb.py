@@ -1,0 +1,87 @@
+"""``fusion bench compare``: which estimator is better on these runs, or that they cannot tell."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from benchmarks.runner.definition import CLEAN, Suite, load_suite
+from benchmarks.runner.plan import cells_of
+from benchmarks.runner.plan_verb import suite_options
+from benchmarks.runner.results import RANKED_BY, Result, comparison, read_results
+from benchmarks.runner.store import Store
+from benchmarks.sheet import Sheet, print_sheets
+from benchmarks.verdict import Comparison
+from fusion import ParameterError, SuiteError
+from fusion.errors import did_you_mean
+
+NOT_MEASURED = 3
+"""Exit code of a verb that found nothing to judge."""
+
+
+def stored_results(arguments: argparse.Namespace) -> tuple[Suite, list[Result]]:
+    """The suite and its results; raises `SuiteError` while some are missing."""
+    suite, store = load_suite(arguments.suite), Store(arguments.store)
+    cells = cells_of(suite, store)
+    results = read_results(cells, store)
+    if len(results) < len(cells):
+        refuse_incomplete(suite, len(results), len(cells))
+    return suite, results
+
+
+def refuse_incomplete(suite: Suite, there: int, wanted: int) -> NoReturn:
+    """A part of a suite is not its result."""
+    raise SuiteError(f"{suite.name}: {there} of {wanted} cells are there; run `fusion bench run` first")
+
+
+def sheet(judged: Comparison) -> Sheet:
+    """Every pair as one row."""
+    rows = []
+    for verdict in judged.verdicts:
+        ratio, low, high = verdict.ratio
+        runs = f"{verdict.compared} of {verdict.runs}"
+        numbers = (
+            f"{ratio:.3f} [{low:.3f}, {high:.3f}]",
+            runs,
+            f"{verdict.holm_p:.2g}",
+            f"{verdict.signed_rank.p:.2g}",
+        )
+        rows.append((f"{verdict.first} / {verdict.second}", *numbers, verdict.winner or "cannot tell"))
+    head = ("pair", "ratio [95 %]", "runs compared", "p, Holm", "p, signed ranks", "better")
+    return Sheet(f"Pairs on {judged.metric}", head, tuple(rows))
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion bench compare``."""
+    suite_options(parser)
+    parser.add_argument("estimators", nargs="*", metavar="ID", help="which of the suite's; all by default")
+    parser.add_argument("--metric", default=RANKED_BY, help="lower is better (%(default)s)")
+    parser.add_argument("--fault", default=CLEAN, help="under which fault (%(default)s)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """One sentence per pair, then the numbers."""
+    _, results = stored_results(arguments)
+    chosen = [one for one in results if not arguments.estimators or one.cell.contestant.id in arguments.estimators]
+    _require(arguments, results)
+    judged = comparison(chosen, arguments.metric, arguments.fault)
+    for verdict in judged.verdicts:
+        sys.stdout.write(f"{verdict.sentence}\n")
+    print_sheets([sheet(judged)])
+    return 0
+
+
+def _require(arguments: argparse.Namespace, results: Sequence[Result]) -> None:
+    ids = {result.cell.contestant.id for result in results}
+    faults = {result.cell.fault.id for result in results}
+    metrics = {name for result in results for name in result.metrics}
+    for what, asked, known in (
+        ("estimator", arguments.estimators, ids),
+        ("fault", [arguments.fault], faults),
+        ("metric", [arguments.metric], metrics),
+    ):
+        for one in asked:
+            if one not in known:
+                raise ParameterError(f"the suite has no {what} {one!r}; {did_you_mean(one, sorted(known))}")

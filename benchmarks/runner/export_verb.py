@@ -1,0 +1,94 @@
+"""``fusion bench export``: the results of a suite for other programs: JSON, CSV, LaTeX, Markdown, JUnit."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from collections.abc import Callable, Sequence
+from io import StringIO
+from pathlib import Path
+from xml.etree import ElementTree
+
+from benchmarks.output import write, write_json
+from benchmarks.runner.compare_verb import stored_results
+from benchmarks.runner.definition import Suite
+from benchmarks.runner.plan_verb import suite_options
+from benchmarks.runner.results import ALIVE, Result, flat, leaderboard, record
+from benchmarks.sheet import Sheet, as_markdown
+
+LATEX_SPECIAL = {"_": r"\_", "%": r"\%", "&": r"\&", "#": r"\#", "°": r"$^\circ$", "∞": r"$\infty$", "\n": " "}
+
+
+def as_csv(results: Sequence[Result]) -> bytes:
+    """One row per cell; what is infinite or does not exist is empty."""
+    rows = [flat(result) for result in results]
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    text = StringIO()
+    table = csv.DictWriter(text, names, lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    return text.getvalue().encode()
+
+
+def as_latex(sheet: Sheet) -> bytes:
+    """A ``tabular`` of the sheet (booktabs)."""
+    columns = "l" + "r" * (len(sheet.head) - 1)
+    rows = [" & ".join(map(_latex, row)) + r" \\" for row in (sheet.head, *sheet.rows)]
+    body = "\n".join([rows[0], r"\midrule", *rows[1:]])
+    head = f"% {sheet.title}\n\\begin{{tabular}}{{{columns}}}\n\\toprule\n"
+    return f"{head}{body}\n\\bottomrule\n\\end{{tabular}}\n".encode()
+
+
+def _latex(text: str) -> str:
+    return "".join(LATEX_SPECIAL.get(letter, letter) for letter in text)
+
+
+def as_junit(suite: Suite, results: Sequence[Result]) -> bytes:
+    """One test case per cell: a lost cell is a failure."""
+    lost = [result for result in results if result.status not in ALIVE]
+    root = ElementTree.Element("testsuite", name=suite.name, tests=str(len(results)), failures=str(len(lost)))
+    for result in results:
+        cell = result.cell
+        case = ElementTree.SubElement(
+            root, "testcase", classname=f"{cell.run.id}.{cell.fault.id}", name=f"{cell.contestant.id}[{cell.seed}]"
+        )
+        if result.status not in ALIVE:
+            ElementTree.SubElement(case, "failure", message=result.status).text = result.error or result.status
+    return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
+
+
+Writer = Callable[[Suite, Sequence[Result], Path], None]
+
+WRITERS: dict[str, tuple[Writer, str]] = {
+    "json": (
+        lambda suite, results, path: write_json(path, record(suite, results)),
+        "every number; a baseline for gate",
+    ),
+    "csv": (lambda _, results, path: write(path, as_csv(results)), "one row per cell"),
+    "latex": (lambda _, results, path: write(path, as_latex(leaderboard(results))), "the leaderboard as a tabular"),
+    "markdown": (
+        lambda _, results, path: write(path, (as_markdown(leaderboard(results)) + "\n").encode()),
+        "the leaderboard as a table",
+    ),
+    "junit": (lambda suite, results, path: write(path, as_junit(suite, results)), "one test case per cell"),
+}
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion bench export``."""
+    suite_options(parser)
+    for kind, (_, what) in WRITERS.items():
+        parser.add_argument(f"--{kind}", type=Path, metavar="F", help=f"{what}; - for stdout")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write what is asked for."""
+    suite, results = stored_results(arguments)
+    for kind, (writer, _) in WRITERS.items():
+        path = getattr(arguments, kind)
+        if path is not None:
+            writer(suite, results, path)
+            if path != Path("-"):
+                sys.stdout.write(f"{path}\n")
+    return 0

@@ -1,0 +1,161 @@
+"""``fusion bench gate``: may this change land? Exit code 0 yes, 1 no, 2 wrong usage or suite, 3 not measured, 4 cannot
+tell, 5 not deterministic; of several the first of 2, 3, 5, 1, 4.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from enum import IntEnum, unique
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from benchmarks.runner.definition import CLEAN, Gate, load_suite
+from benchmarks.runner.plan import cells_of
+from benchmarks.runner.plan_verb import suite_options
+from benchmarks.runner.results import ALIVE, Result, by_contestant, read_results, score_matrix
+from benchmarks.runner.store import Store
+from benchmarks.runner.verify_verb import differing
+from benchmarks.score import METRICS_VERSION
+from benchmarks.track import Floats
+from benchmarks.verdict import compare
+from fusion import FusionError, SuiteError
+
+
+@unique
+class Outcome(IntEnum):
+    """What a gate says, as its exit code."""
+
+    PASS = 0
+    REGRESSION = 1
+    USAGE = 2
+    NOT_MEASURED = 3
+    CANNOT_TELL = 4
+    NOT_DETERMINISTIC = 5
+
+
+GRAVEST_FIRST = (
+    Outcome.USAGE,
+    Outcome.NOT_MEASURED,
+    Outcome.NOT_DETERMINISTIC,
+    Outcome.REGRESSION,
+    Outcome.CANNOT_TELL,
+    Outcome.PASS,
+)
+
+
+class Finding(NamedTuple):
+    """One condition of a gate, and what came of it."""
+
+    outcome: Outcome
+    text: str
+
+
+Baseline = Mapping[str, Sequence[Mapping[str, Any]]]
+"""Rows of an earlier record, by contestant."""
+
+
+def judge(results: Sequence[Result], gate: Gate, baseline: Baseline | None) -> list[Finding]:
+    """Every condition of ``gate`` on results without faults."""
+    findings = []
+    for name, own in by_contestant(results, CLEAN).items():
+        for metric, least in gate.floor.items():
+            findings.append(_floor(name, own, metric, least))
+        if baseline is not None:
+            findings += _against(name, own, gate, baseline.get(name))
+    return findings
+
+
+def _floor(name: str, own: Sequence[Result], metric: str, least: float) -> Finding:
+    worst = min(result.metrics.get(metric, float("-inf")) for result in own)
+    text = f"{name}: {metric} is {worst:g} at worst, {least:g} at least is asked"
+    return Finding(Outcome.PASS if worst >= least else Outcome.REGRESSION, text)
+
+
+def _against(name: str, own: Sequence[Result], gate: Gate, before: Sequence[Mapping[str, Any]] | None) -> list[Finding]:
+    if before is None:
+        return [Finding(Outcome.CANNOT_TELL, f"{name}: the baseline does not know it")]
+    lost_before = {(row["run"], row["seed"]) for row in before if row["status"] not in ALIVE}
+    findings = [
+        Finding(Outcome.REGRESSION, f"{result.cell}: {result.status}, and was not before")
+        for result in own
+        if result.status not in ALIVE and (result.cell.run.id, result.cell.seed) not in lost_before
+    ]
+    for metric, margin in gate.ratio.items():
+        findings.append(_ratio(name, metric, margin, score_matrix(own, metric), _matrix(before, metric)))
+    return findings
+
+
+def _matrix(rows: Sequence[Mapping[str, Any]], metric: str) -> Floats:
+    runs = list(dict.fromkeys(row["run"] for row in rows))
+    table = [[row.get(metric) for row in rows if row["run"] == run] for run in runs]
+    return np.array([[np.inf if value is None else value for value in row] for row in table], dtype=np.float64)
+
+
+def _ratio(name: str, metric: str, margin: float, now: Floats, before: Floats) -> Finding:
+    """Regression when the whole interval of now over before is above 1 + margin, pass when all of it is below."""
+    if now.shape != before.shape:
+        return Finding(Outcome.CANNOT_TELL, f"{name}: {metric}: the baseline has other runs or seeds")
+    if np.allclose(now, before, rtol=1e-12, atol=0.0):
+        return Finding(Outcome.PASS, f"{name}: {metric} is what it was")
+    (verdict,) = compare({"now": now, "before": before}, metric).verdicts
+    ratio, low, high = verdict.ratio
+    text = f"{name}: {metric} now / before {ratio:.3f} [{low:.3f}, {high:.3f}], margin {1.0 + margin:g}"
+    if low > 1.0 + margin:
+        return Finding(Outcome.REGRESSION, text)
+    return Finding(Outcome.PASS if high <= 1.0 + margin else Outcome.CANNOT_TELL, text)
+
+
+def read_baseline(path: Path) -> Baseline:
+    """What `fusion bench export --json` has written, by contestant; raises `SuiteError`."""
+    try:
+        stored = json.loads(path.read_text(encoding="utf-8"))
+        rows, version = stored["results"], stored["metrics_version"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise SuiteError(f"{path}: no baseline ({error!r}); write one with `fusion bench export --json`") from error
+    if version != METRICS_VERSION:
+        raise SuiteError(f"{path}: of metrics {version}, these are {METRICS_VERSION}; write the baseline anew")
+    grouped: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        if row["fault"] == CLEAN:
+            grouped.setdefault(row["estimator"], []).append(row)
+    return grouped
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion bench gate``."""
+    suite_options(parser)
+    parser.add_argument("--baseline", type=Path, metavar="F", help="in place of the one the suite names")
+    parser.add_argument("--verify", type=int, default=0, metavar="N", help="compute N cells again and compare")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Judge, tell every finding, answer the gravest."""
+    try:
+        findings = _findings(arguments)
+    except FusionError as error:
+        findings = [Finding(Outcome.USAGE, str(error))]
+    for finding in findings:
+        sys.stdout.write(f"{finding.outcome.name.lower().replace('_', ' ')}: {finding.text}\n")
+    return int(min((finding.outcome for finding in findings), key=GRAVEST_FIRST.index))
+
+
+def _findings(arguments: argparse.Namespace) -> list[Finding]:
+    suite, store = load_suite(arguments.suite), Store(arguments.store)
+    cells = cells_of(suite, store)
+    results = read_results(cells, store)
+    if len(results) < len(cells) or not results:
+        return [Finding(Outcome.NOT_MEASURED, f"{len(results)} of {len(cells)} cells are there; run the suite first")]
+    named = arguments.baseline or (suite.folder / suite.gate.baseline if suite.gate.baseline else None)
+    found = judge(results, suite.gate, read_baseline(named) if named else None)
+    found += [
+        Finding(Outcome.NOT_DETERMINISTIC, f"{cell}: computed again, it differs")
+        for cell in differing(cells, store, arguments.verify)
+    ]
+    if suite.gate.inconclusive == "warn":
+        found = [one._replace(outcome=Outcome.PASS) if one.outcome is Outcome.CANNOT_TELL else one for one in found]
+    return found or [Finding(Outcome.NOT_MEASURED, "the suite's [gate] asks for nothing; give ratio or floor")]

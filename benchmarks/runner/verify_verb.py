@@ -1,0 +1,60 @@
+"""``fusion bench verify``: compute a sample of the stored cells again, and see whether they are what they were."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from benchmarks.runner.definition import load_suite
+from benchmarks.runner.execute import carry_out
+from benchmarks.runner.plan import Cell, cells_of
+from benchmarks.runner.plan_verb import suite_options
+from benchmarks.runner.store import Store
+
+NOT_DETERMINISTIC, NOT_MEASURED = 5, 3
+"""Exit codes."""
+
+
+def differing(cells: Sequence[Cell], store: Store, count: int) -> list[Cell]:
+    """The cells, of ``count`` evenly spread over the keys of those that are there, that come out differently now."""
+    there = sorted((cell for cell in cells if store.has("scores", cell.score_key)), key=lambda cell: cell.estimate_key)
+    sample = there[:: max(len(there) // count, 1)][:count] if count else []
+    with tempfile.TemporaryDirectory(prefix="fusion-verify-") as folder:
+        again = Store(Path(folder))
+        return [cell for cell in sample if not _same(cell, store, again)]
+
+
+def _same(cell: Cell, store: Store, again: Store) -> bool:
+    carry_out((cell, again.folder))
+    return all(
+        store.read(kind, key, name) == again.read(kind, key, name)
+        for kind, key, name in (
+            ("estimates", cell.estimate_key, "result.json"),
+            ("estimates", cell.estimate_key, "track.npz"),
+            ("scores", cell.score_key, "result.json"),
+        )
+    )
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion bench verify``."""
+    suite_options(parser)
+    parser.add_argument("--sample", type=int, default=10, metavar="N", help="how many cells (%(default)s)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Name the cells that differ. Exit code 5 when some do, 3 when none is there to compare."""
+    suite, store = load_suite(arguments.suite), Store(arguments.store)
+    cells = cells_of(suite, store)
+    if not any(store.has("scores", cell.score_key) for cell in cells):
+        sys.stderr.write("fusion bench verify: no cell is there; run the suite first\n")
+        return NOT_MEASURED
+    wrong = differing(cells, store, arguments.sample)
+    for cell in wrong:
+        sys.stdout.write(f"{cell}: computed again, it differs\n")
+    if not wrong:
+        sys.stdout.write("computed again, every sampled cell is the same to the bit\n")
+    return NOT_DETERMINISTIC if wrong else 0

@@ -1,0 +1,191 @@
+"""What is asked of stored results: comparisons, the gate with its exit codes, verification, exports."""
+
+import csv
+import json
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from benchmarks.runner.compare_verb import stored_results
+from benchmarks.runner.definition import Gate, load_suite
+from benchmarks.runner.gate_verb import Outcome, judge, read_baseline
+from benchmarks.runner.plan import cells_of
+from benchmarks.runner.results import comparison, flat, score_matrix
+from benchmarks.runner.run_verb import run_suite
+from benchmarks.runner.store import Store
+from benchmarks.runner.verify_verb import differing
+from fusion.cli import main
+
+HEAD = '[suite]\nname = "verbs"\n'
+RUNS = "".join(
+    f'[[runs]]\nid = "run{seed}"\nscenario = "paper_mec"\nseed = {seed}\nduration_s = 60.0\n' for seed in range(8)
+)
+TAIL = """
+[[estimators]]
+id = "wheels"
+use = "dead_reckoning"
+[[estimators]]
+id = "radio"
+use = "radio_only"
+[gate]
+ratio = { pos_p75 = 0.05 }
+floor = { availability = 0.99 }
+"""
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("verbs")
+    (folder / "suite.toml").write_text(HEAD + RUNS + TAIL, encoding="utf-8")
+    suite = load_suite(folder / "suite.toml")
+    run_suite(suite, Store(folder / "store"), workers=1)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def results(place):
+    from argparse import Namespace
+
+    return stored_results(Namespace(suite=place / "suite.toml", store=place / "store"))[1]
+
+
+def words(place, verb, *more):
+    return ["bench", verb, str(place / "suite.toml"), "--store", str(place / "store"), *more]
+
+
+def scaled(results, contestant, factors):
+    """The results with one contestant's p75 multiplied, run by run."""
+    return [
+        result._replace(metrics={**result.metrics, "pos_p75": factors[k % 8] * result.metrics["pos_p75"]})
+        if result.cell.contestant.id == contestant
+        else result
+        for k, result in ((int(result.cell.run.id.removeprefix("run")), result) for result in results)
+    ]
+
+
+def baseline_of(results):
+    rows = json.loads(json.dumps([flat(result) for result in results]))
+    return {name: [row for row in rows if row["estimator"] == name] for name in ("wheels", "radio")}
+
+
+def test_matrix_has_one_row_a_run_and_infinity_where_a_run_was_lost(results):
+    own = [result for result in results if result.cell.contestant.id == "wheels"]
+    assert score_matrix(own, "pos_p75").shape == (8, 1)
+    assert np.isinf(score_matrix(own, "no_such_metric")).all()
+
+
+def test_compare_says_in_a_sentence_who_is_better_or_that_it_cannot_tell(place, results, capsys):
+    assert main(words(place, "compare")) == 0
+    said = capsys.readouterr().out
+    (verdict,) = comparison(results).verdicts
+    assert said.startswith(verdict.sentence)
+    assert "ratio [95 %]" in said
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (["wheelz"], "did you mean 'wheels'"),
+        (["--metric", "pos_p755"], "did you mean 'pos_p75'"),
+        (["--fault", "claen"], "did you mean 'clean'"),
+    ],
+)
+def test_compare_refuses_what_the_suite_does_not_have(place, more, message, capsys):
+    assert main(words(place, "compare", *more)) == 1
+    assert message in capsys.readouterr().err
+
+
+def outcomes(findings):
+    return {finding.outcome for finding in findings}
+
+
+@pytest.mark.parametrize(
+    ("factors", "expected"),
+    [
+        pytest.param([1.0] * 8, Outcome.PASS, id="unchanged"),
+        pytest.param([0.8] * 8, Outcome.PASS, id="better everywhere"),
+        pytest.param([1.03, 1.02, 1.01, 1.02, 1.03, 1.01, 1.02, 1.03], Outcome.PASS, id="worse within the margin"),
+        pytest.param([1.2, 1.3, 1.25, 1.2, 1.3, 1.2, 1.25, 1.3], Outcome.REGRESSION, id="clearly worse"),
+        pytest.param([0.7, 1.5, 0.8, 1.4, 0.9, 1.3, 0.75, 1.6], Outcome.CANNOT_TELL, id="now better, now worse"),
+    ],
+)
+def test_gate_judges_the_whole_interval_against_the_margin(results, factors, expected):
+    findings = judge(scaled(results, "wheels", factors), Gate(ratio={"pos_p75": 0.05}), baseline_of(results))
+    assert outcomes(findings) == {expected, Outcome.PASS}
+
+
+def test_gate_holds_the_worst_cell_against_a_floor(results):
+    assert outcomes(judge(results, Gate(floor={"availability": 0.99}), None)) == {Outcome.PASS}
+    spoilt = [results[0]._replace(metrics={**results[0].metrics, "availability": 0.5}), *results[1:]]
+    assert Outcome.REGRESSION in outcomes(judge(spoilt, Gate(floor={"availability": 0.99}), None))
+
+
+def test_a_cell_that_is_lost_now_and_was_not_before_is_a_regression(results):
+    lost = [results[0]._replace(status="crashed"), *results[1:]]
+    assert outcomes(judge(lost, Gate(), baseline_of(results))) == {Outcome.REGRESSION}
+    assert judge(lost, Gate(), baseline_of(lost)) == []
+
+
+def test_contestant_that_the_baseline_does_not_know_cannot_be_told(results):
+    known = {"wheels": baseline_of(results)["wheels"]}
+    assert Outcome.CANNOT_TELL in outcomes(judge(results, Gate(ratio={"pos_p75": 0.05}), known))
+
+
+def test_gate_answers_with_the_exit_code_of_its_gravest_finding(place, tmp_path, capsys):
+    assert main(words(place, "export", "--json", str(tmp_path / "base.json"))) == 0
+    gate = words(place, "gate", "--baseline", str(tmp_path / "base.json"))
+    assert main(gate) == Outcome.PASS
+    assert main([*gate, "--verify", "3"]) == Outcome.PASS
+    stored = json.loads((tmp_path / "base.json").read_text())
+    for row in stored["results"]:
+        row["pos_p75"] /= 2.0
+    (tmp_path / "base.json").write_text(json.dumps(stored))
+    assert main(gate) == Outcome.REGRESSION
+    assert main(words(place, "gate", "--baseline", str(tmp_path / "none.json"))) == Outcome.USAGE
+    empty = ["bench", "gate", str(place / "suite.toml"), "--store", str(tmp_path / "empty")]
+    assert main(empty) == Outcome.NOT_MEASURED
+    assert "not measured: 0 of 16 cells are there" in capsys.readouterr().out
+
+
+def test_baseline_of_other_metrics_is_refused(place, tmp_path, capsys):
+    path = tmp_path / "old.json"
+    path.write_text('{"results": [], "metrics_version": 0}')
+    assert main(words(place, "gate", "--baseline", str(path))) == Outcome.USAGE
+    assert "write the baseline anew" in capsys.readouterr().out
+
+
+def test_verify_finds_the_cell_that_was_tampered_with(place, tmp_path, capsys):
+    suite, store = load_suite(place / "suite.toml"), Store(tmp_path / "store")
+    cut = replace(suite, runs=suite.runs[:1])
+    assert main(["bench", "verify", str(place / "suite.toml"), "--store", str(store.folder)]) == 3
+    run_suite(cut, store, workers=1)
+    cells = cells_of(cut, store)
+    assert differing(cells, store, 10) == []
+    track = store.place("estimates", cells[1].estimate_key) / "track.npz"
+    track.write_bytes((store.place("estimates", cells[0].estimate_key) / "track.npz").read_bytes())
+    assert [str(cell) for cell in differing(cells, store, 10)] == [str(cells[1])]
+    assert main(["bench", "verify", str(place / "suite.toml"), "--store", str(store.folder)]) == 5
+    assert "it differs" in capsys.readouterr().out
+
+
+def test_exports_hold_every_cell(place, results, tmp_path, capsys):
+    kinds = ("json", "csv", "latex", "markdown", "junit")
+    files = {kind: tmp_path / f"out.{kind}" for kind in kinds}
+    assert main(words(place, "export", *(word for kind in kinds for word in (f"--{kind}", str(files[kind]))))) == 0
+    assert len(json.loads(files["json"].read_text())["results"]) == len(results) == 16
+    rows = list(csv.DictReader(files["csv"].read_text().splitlines()))
+    assert [float(row["pos_p75"]) for row in rows] == [result.metrics["pos_p75"] for result in results]
+    assert files["latex"].read_text().count(r"\\") == 3
+    assert files["markdown"].read_text().count("| ") >= 3
+    suite = ElementTree.fromstring(files["junit"].read_text())
+    assert (suite.get("tests"), suite.get("failures")) == ("16", "0")
+    assert len(suite.findall("testcase")) == 16
+    assert read_baseline(files["json"]).keys() == {"wheels", "radio"}
+
+
+def test_verbs_refuse_a_suite_that_is_not_done(place, tmp_path, capsys):
+    for verb in ("compare", "export"):
+        assert main(["bench", verb, str(place / "suite.toml"), "--store", str(tmp_path / "none")]) == 1
+        assert "0 of 16 cells are there; run `fusion bench run` first" in capsys.readouterr().err
