@@ -1,0 +1,138 @@
+"""The figures of a report, by matplotlib, in the colours that estimators have everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks.plotting import label, panels, plain_colour, plain_ticks
+from benchmarks.report.material import Material
+from benchmarks.runner.results import by_contestant, score_matrix
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LINES = ("-", "--", ":", "-.")
+LONGEST_LINE = 2000
+"""Points a line is thinned to: a picture shows no more."""
+
+
+def summary(material: Material) -> Figure:
+    """Distribution, run by run, and honesty, side by side."""
+    figure, (left, middle, right) = panels(3, 4.2)
+    _cdf(left, material)
+    _paired(middle, material)
+    _consistency(right, material)
+    return figure
+
+
+def _cdf(axes: Axes, material: Material) -> None:
+    """How often the error is below a distance; a curve ends at the availability, not at one."""
+    for name in material.contestants:
+        errors = np.concatenate([s.error_m for (_, own), s in material.series.items() if own == name] or [np.zeros(0)])
+        finite = np.sort(errors[np.isfinite(errors)])
+        if len(finite):
+            share = np.arange(1, len(finite) + 1) / len(errors)
+            step = max(len(finite) // LONGEST_LINE, 1)
+            axes.plot(100.0 * finite[::step], 100.0 * share[::step], **_style(material, name))
+    axes.set_xscale("log")
+    plain_ticks(axes.xaxis, (1.0,))
+    axes.set_ylim(0.0, 100.0)
+    label(axes, "all shown runs, without faults", "position error, cm", "share of instants, %")
+    axes.legend(frameon=False, fontsize=8)
+
+
+def over_time(material: Material) -> Figure:
+    """Position error over time, run by run; gaps where there was no valid answer."""
+    figure, row = panels(max(len(material.scored_runs), 1), 3.2)
+    for axes, run_id in zip(row, material.scored_runs, strict=False):
+        for name in material.contestants:
+            if (series := material.series.get((run_id, name))) is not None:
+                step = max(len(series.time_s) // LONGEST_LINE, 1)
+                error_cm = 100.0 * np.where(np.isfinite(series.error_m), series.error_m, np.nan)
+                axes.plot(series.time_s[::step], error_cm[::step], linewidth=1, **_style(material, name))
+        axes.set_ylim(0.0, None)
+        label(axes, run_id, "time, s", "position error, cm")
+    _shared_legend(figure, row[0])
+    return figure
+
+
+def _paired(axes: Axes, material: Material) -> None:
+    """The ranking metric of every run, joined run by run: what the verdicts are made of."""
+    grouped = by_contestant(material.results)
+    columns = [np.median(score_matrix(grouped[name], material.metric), axis=1) for name in material.contestants]
+    scores = 100.0 * np.stack(columns, axis=1)
+    for row in scores:
+        axes.plot(range(len(row)), row, color="0.7", linewidth=1, zorder=1)
+    for place, name in enumerate(material.contestants):
+        known = np.isfinite(scores[:, place])
+        colour = plain_colour(_use(material, name))
+        axes.scatter(np.full(known.sum(), place), scores[known, place], color=colour, s=24, zorder=2)
+    axes.set_yscale("log")
+    plain_ticks(axes.yaxis)
+    axes.set_xticks(range(len(columns)), material.contestants, rotation=30, ha="right")
+    label(axes, "one line per run", "", f"{material.metric}, cm")
+
+
+def _consistency(axes: Axes, material: Material) -> None:
+    """ANEES of every cell without faults; the grey band is half to twice of what is honest."""
+    grouped = by_contestant(material.results)
+    axes.axhspan(0.5, 2.0, color="0.9", zorder=0)
+    axes.axhline(1.0, color="0.5", linewidth=1, zorder=1)
+    for place, name in enumerate(material.contestants):
+        values = np.array([result.metrics.get("anees", np.nan) for result in grouped[name]])
+        values = values[np.isfinite(values)]
+        colour = plain_colour(_use(material, name))
+        axes.scatter(np.full(len(values), place), values, color=colour, s=24, zorder=2)
+    axes.set_yscale("log")
+    plain_ticks(axes.yaxis)
+    axes.set_xticks(range(len(material.contestants)), material.contestants, rotation=30, ha="right")
+    label(axes, "above 1: more certain than right", "", "ANEES")
+
+
+def maps(material: Material) -> Figure:
+    """Where the best estimator errs: truth in grey, its track coloured by its error."""
+    figure, row = panels(max(len(material.scored_runs), 1), 4.0)
+    best = material.contestants[0]
+    for axes, run_id in zip(row, material.scored_runs, strict=False):
+        if (series := material.series.get((run_id, best))) is None:
+            continue
+        world = material.run(run_id).world
+        for wall in world.walls:
+            axes.plot(*np.array(wall).T, color="0.7", linewidth=1)
+        axes.plot(series.instants.x, series.instants.y, color="0.5", linewidth=1)
+        valid = series.answers.valid
+        step = max(int(valid.sum()) // LONGEST_LINE, 1)
+        where = (series.answers.x[valid][::step], series.answers.y[valid][::step])
+        drawn = axes.scatter(*where, c=100.0 * series.error_m[valid][::step], cmap="viridis", s=5)
+        axes.plot([a.x for a in world.anchors], [a.y for a in world.anchors], "k^", markersize=6)
+        axes.set_aspect("equal")
+        label(axes, f"{run_id}: {best}", "x, m", "y, m")
+        figure.colorbar(drawn, ax=axes, label="position error, cm", shrink=0.8)
+    return figure
+
+
+def _style(material: Material, name: str) -> dict[str, Any]:
+    """The colour of the estimator; its contestants are told apart by their lines."""
+    use = _use(material, name)
+    alike = [other for other in material.contestants if _use(material, other) == use]
+    return {"color": plain_colour(use), "linestyle": LINES[alike.index(name) % len(LINES)], "label": name}
+
+
+def _use(material: Material, name: str) -> str:
+    return next(one.use for one in material.suite.contestants if one.id == name)
+
+
+def _shared_legend(figure: Figure, axes: Axes) -> None:
+    handles, names = axes.get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=5, frameon=False, fontsize=8)
+
+
+FIGURES: Mapping[str, Callable[[Material], Figure]] = {
+    "summary": summary,
+    "over_time": over_time,
+    "maps": maps,
+}

@@ -1,0 +1,96 @@
+"""The tables of a report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from benchmarks.report.material import Material
+from benchmarks.report.worst import Moment, command
+from benchmarks.runner.definition import CLEAN
+from benchmarks.runner.results import ALIVE, Result, by_contestant, median_metrics, score_matrix
+from benchmarks.score import quantile
+from benchmarks.sheet import Sheet
+from benchmarks.table import COLUMNS, as_text
+
+
+def leaderboard(material: Material) -> Sheet:
+    """The best first, with the letters that say who cannot be told apart, and the worst run beside the median."""
+    shown = [column for column in COLUMNS if column.key != "cpu_per_measurement_s"]
+    grouped = by_contestant(material.results)
+    letters = material.comparison.letters if material.comparison else {}
+    rows = []
+    for name in material.contestants:
+        own = grouped[name]
+        medians, alive = median_metrics(own), sum(result.status in ALIVE for result in own)
+        scores = np.median(score_matrix(own, material.metric), axis=1)
+        worst = f"{100.0 * scores.max():.1f}" if np.isfinite(scores.max()) else "∞"
+        numbers = (as_text(column, medians) for column in shown)
+        rows.append((name, letters.get(name, "–"), f"{alive}/{len(own)}", worst, *numbers))
+    titles = (column.title.replace("\n", " ") for column in shown)
+    head = ("estimator", "alike", "cells ok", f"worst run, {material.metric} cm", *titles)
+    return Sheet("Leaderboard: medians over cells without faults", head, tuple(rows))
+
+
+def faults(material: Material) -> Sheet:
+    """How much worse each fault makes each contestant: the median over runs of faulty over clean."""
+    clean = by_contestant(material.results)
+    rows = []
+    for name in material.contestants:
+        base = np.median(score_matrix(clean[name], material.metric), axis=1)
+        cells = []
+        for fault in material.suite.faults[1:]:
+            own = by_contestant(material.results, fault.id)[name]
+            ratio = quantile(np.median(score_matrix(own, material.metric), axis=1) / base, 0.5)
+            lost = sum(result.status not in ALIVE for result in own)
+            cells.append(_times(ratio) + (f" ({lost} lost)" if lost else ""))
+        rows.append((name, *cells))
+    head = ("estimator", *(fault.id for fault in material.suite.faults if fault.id != CLEAN))
+    return Sheet(f"Faults: {material.metric} as a multiple of the clean run's, median over runs", head, tuple(rows))
+
+
+def _times(ratio: float) -> str:
+    return "∞" if not math.isfinite(ratio) else f"{ratio:.2f}×"
+
+
+def moments(found: Sequence[Moment]) -> Sheet:
+    """Where to look first."""
+    rows = tuple(
+        (moment.run.id, moment.contestant, f"{moment.time_s:.1f}", f"{100.0 * moment.error_m:.0f}", command(moment))
+        for moment in found
+    )
+    return Sheet("Worst moments", ("run", "estimator", "time, s", "error, cm", "command"), rows, prose=True)
+
+
+def lost(results: Sequence[Result]) -> Sheet:
+    """Every cell that did not survive, and why."""
+    rows = tuple(
+        (str(result.cell), result.status, result.error or "fewer than half of its answers were valid")
+        for result in results
+        if result.status not in ALIVE
+    )
+    return Sheet("Lost cells", ("cell", "status", "why"), rows, prose=True)
+
+
+def provenance(material: Material) -> Sheet:
+    """What every run and estimator of the suite is, down to the hash."""
+    runs = [
+        (run.id, run.mcap or f"{run.scenario}, seed {run.seed}", run.split, _content(material, run.id))
+        for run in material.suite.runs
+    ]
+    return Sheet("Runs", ("run", "source", "split", "content"), tuple(runs), prose=True)
+
+
+def _content(material: Material, run_id: str) -> str:
+    return next(result.cell.content.measured[:16] for result in material.results if result.cell.run.id == run_id)
+
+
+def contestants(material: Material) -> Sheet:
+    """What was run under each name."""
+    rows = tuple(
+        (one.id, one.use, ", ".join(f"{key} = {value}" for key, value in one.params.items()) or "defaults")
+        for one in material.suite.contestants
+    )
+    return Sheet("Estimators", ("id", "estimator", "parameters"), rows, prose=True)

@@ -1,0 +1,114 @@
+"""The report of a suite: one page, no network, every part of it there, drawn by a real browser without errors."""
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from benchmarks.report.figures import FIGURES
+from benchmarks.report.material import Material
+from benchmarks.report.verb import report
+from benchmarks.report.worst import APART_S, command, worst_moments
+from benchmarks.runner.definition import load_suite
+from benchmarks.runner.plan import cells_of
+from benchmarks.runner.results import read_results
+from benchmarks.runner.run_verb import run_suite
+from benchmarks.runner.store import Store
+from fusion.cli import main
+
+SUITE = """
+[suite]
+name = "page"
+[[runs]]
+id = "office"
+scenario = "office"
+duration_s = 20.0
+[[runs]]
+id = "mec"
+scenario = "mec"
+duration_s = 20.0
+[[estimators]]
+id = "wheels"
+use = "dead_reckoning"
+[[estimators]]
+id = "radio"
+use = "radio_only"
+[[faults]]
+id = "silence"
+apply = [{ kind = "drop", topic = "wifi" }]
+"""
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    (folder / "suite.toml").write_text(SUITE, encoding="utf-8")
+    run_suite(load_suite(folder / "suite.toml"), Store(folder / "store"), workers=1)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def material(place):
+    suite, store = load_suite(place / "suite.toml"), Store(place / "store")
+    return Material(suite, read_results(cells_of(suite, store), store), store)
+
+
+def test_page_holds_verdicts_tables_figures_and_provenance(material):
+    page = report(material, "fusion bench run suite.toml")
+    assert page.count("data:image/png;base64,") == len(FIGURES)
+    for part in ("Leaderboard", "Pairs on pos_p75", "Faults", "Worst moments", "Lost cells", "Runs", "Estimators"):
+        assert f"**{part}" in page
+    assert "wheels" in page.splitlines()[2]
+    assert "fusion bench run suite.toml" in page
+
+
+def test_radio_without_radio_is_lost_and_said_to_be(material):
+    page = report(material, "")
+    assert re.search(r"\| radio \|.*∞", page)
+    assert "office radio silence 0" in page
+
+
+def test_worst_moments_are_the_largest_errors_and_lead_to_the_review(material):
+    moments = worst_moments(material)
+    assert [moment.error_m for moment in moments] == sorted((moment.error_m for moment in moments), reverse=True)
+    for moment in moments:
+        error_m = material.series[moment.run.id, moment.contestant].error_m
+        assert moment.error_m == error_m[np.isfinite(error_m)].max()
+        assert command(moment).endswith(f"--estimators {moment.use} --at {moment.time_s:.1f}")
+    assert APART_S > 0.0
+
+
+def test_contestants_are_ordered_by_the_median_of_what_is_compared(material):
+    assert material.contestants == ["wheels", "radio"]
+    assert material.comparison.letters.keys() == {"wheels", "radio"}
+
+
+def test_command_writes_one_file_that_needs_no_network(place, tmp_path, capsys):
+    target = tmp_path / "page.html"
+    words = ["bench", "report", str(place / "suite.toml"), "--store", str(place / "store"), "--html", str(target)]
+    assert main(words) == 0
+    assert capsys.readouterr().out == f"{target}\n"
+    html = target.read_text(encoding="utf-8")
+    assert not re.search(r'(src|href)="(?!data:)', html)
+    assert '<meta name="viewport"' in html
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium to look at the page with")
+def test_browser_draws_the_page_without_console_errors(place, tmp_path):
+    target, picture = tmp_path / "page.html", tmp_path / "page.png"
+    assert (
+        main(["bench", "report", str(place / "suite.toml"), "--store", str(place / "store"), "--html", str(target)])
+        == 0
+    )
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--window-size=420,2000"]
+    done = subprocess.run(
+        ["chromium", *options, f"--user-data-dir={tmp_path}/profile", f"--screenshot={picture}", target.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert "CONSOLE" not in done.stderr
+    assert picture.stat().st_size > 20_000
