@@ -1,76 +1,37 @@
-"""The layout of a review, so that nobody has to click: the map on the left, what went wrong and why on the right."""
+"""The layout of a review, so that nobody has to click: pages, and on the first the map on the left, what went wrong
+and why on the right.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from benchmarks.colours import GROUND
-from benchmarks.lane import Lane
+from benchmarks.drawing import SHOWN, Drawing
+from benchmarks.estimator_plots import AXES
+from benchmarks.frame import TIMELINE, Frame
+from benchmarks.raw_sensors import SPEED, TURN_RATE
+from benchmarks.score import quantile
+from benchmarks.views import cdf_view, event_view, map_view, plot, score_view, state_view, table_view, tabs
 from fusion import Ranges, WifiScan
-from fusion.values import seconds
 from logs.run import Run
 
-TIMELINE = "t"
-"""Time since the run's first message."""
-SHOWN = 6
-"""Tracks that are switched on, the best ones: more cannot be told apart. The eye beside an entity shows the others."""
-TRAIL_S = 10.0
-"""How far back the strong part of a track goes."""
-MARGIN = 0.06
-"""Free space around the floor, as a share of its width."""
-LEGEND = 0.24
-"""Room for the legend to the right of the floor, as a share of its width."""
 NIS_SHOWN = 12.0
 """Top of the NIS plot: three times the 95 % limit."""
+NEES_SHOWN = 30.0
+"""Least top of the NEES plot: three times the upper bound."""
 
 
-class Frame(NamedTuple):
-    """The part of the map [m] and of time [ns] that is shown."""
-
-    x_min: float
-    x_max: float
-    y_min: float
-    y_max: float
-    start_ns: int
-    end_ns: int
-
-    @classmethod
-    def around(cls, run: Run) -> Frame:
-        """The floor with all anchors and the true path, from the first message to the last."""
-        bounds, anchors = run.world.bounds, run.world.anchors
-        xs = [bounds.x_min, bounds.x_max, *(anchor.x for anchor in anchors)]
-        ys = [bounds.y_min, bounds.y_max, *(anchor.y for anchor in anchors)]
-        stamps = [measurement.time_ns for measurement in run.measurements]
-        if run.truth is not None:
-            known = np.isfinite(run.truth.x) & np.isfinite(run.truth.y)
-            xs += run.truth.x[known].tolist()
-            ys += run.truth.y[known].tolist()
-            stamps += run.truth.time_ns[known].tolist()
-        return cls(min(xs), max(xs), min(ys), max(ys), min(stamps, default=0), max(stamps, default=0))
-
-    @property
-    def duration_s(self) -> float:
-        """Length of the run [s]."""
-        return seconds(self.end_ns - self.start_ns)
-
-    def legend(self, count: int) -> list[tuple[float, float]]:
-        """Places [m] for that many entries, from the top down."""
-        x = self.x_max + 0.6 * LEGEND * (self.x_max - self.x_min)
-        step = (self.y_max - self.y_min) / max(count, 8)
-        return [(x, self.y_max - (i + 0.5) * step) for i in range(count)]
-
-
-def blueprint(frame: Frame, run: Run, ranking: Sequence[Lane]) -> Any:  # noqa: ANN401 - Rerun's own value
-    """The layout for the lanes of ``ranking``, the best first."""
+def blueprint(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401 - Rerun's own value
+    """The layout for the lanes ``drawn``, the best first."""
     import rerun.blueprint as rrb
 
-    left = rrb.Vertical(_map(frame, run, ranking), _scores(), row_shares=[3, 1.3])
-    right = rrb.Vertical(_errors(frame), _readings(frame, run), _fates(frame, ranking), row_shares=[2.2, 1.5, 2.3])
+    pages = [_overview(frame, run, drawn), _readings(frame, run, drawn), _motion(frame)]
+    pages += [rrb.Vertical(table_view(drawn), name="Table")] if run.truth is not None else []
     return rrb.Blueprint(
-        rrb.Horizontal(left, right, column_shares=[3, 2]),
+        rrb.Tabs(*pages, active_tab=0),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="paused"),
         collapse_panels=True,
         auto_layout=False,
@@ -78,101 +39,89 @@ def blueprint(frame: Frame, run: Run, ranking: Sequence[Lane]) -> Any:  # noqa: 
     )
 
 
-def _map(frame: Frame, run: Run, ranking: Sequence[Lane]) -> Any:  # noqa: ANN401
+def _overview(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
     import rerun.blueprint as rrb
 
-    width, margin = frame.x_max - frame.x_min, MARGIN * (frame.x_max - frame.x_min)
-    # Rerun's 2D views look down their y axis: the map is mirrored into them, and so are its bounds.
-    bounds = rrb.VisualBounds2D(
-        x_range=[frame.x_min - margin, frame.x_max + LEGEND * width],
-        y_range=[-frame.y_max - margin, -frame.y_min + margin],
-    )
-    return rrb.Spatial2DView(
-        name=f"{run.name}: tracks (m, y up), 95 % ellipses",
-        origin="/",
-        contents="/map/**",
-        background=list(GROUND),
-        visual_bounds=bounds,
-        overrides=_overrides(ranking),
-    )
+    has_truth = run.truth is not None
+    scores = rrb.Horizontal(score_view(), cdf_view(drawn), column_shares=[3, 2]) if has_truth else score_view()
+    left = rrb.Vertical(map_view(frame, run, drawn), scores, row_shares=[2, 1])
+    # More names than that hide the plot; the map's own legend stands beside it.
+    titles = {"Position error (m)": "/error", "Heading error (°)": "/heading_error"}
+    errors = [plot(frame, title, origin, legend=len(drawn) <= SHOWN) for title, origin in titles.items()]
+    details = _details(frame, drawn)
+    right = [(tabs(errors), 2.0)] if has_truth else []
+    right += [(tabs(_reception(frame, run, drawn)), 1.8)]
+    right += [(tabs(details), 3.2)] if details else []
+    views, shares = zip(*right, strict=True)
+    return rrb.Horizontal(left, rrb.Vertical(*views, row_shares=shares), column_shares=[3, 2], name="Overview")
 
 
-def _overrides(ranking: Sequence[Lane]) -> dict[Any, Any]:
-    """Trails reach back from the cursor; the tracks of all but the best are switched off."""
-    import rerun as rr
-    import rerun.blueprint as rrb
-
-    now = rrb.TimeRangeBoundary.cursor_relative
-    trail = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(TIMELINE, start=now(seconds=-TRAIL_S), end=now(seconds=0.0))])
-    places = [["map", "estimate", lane.name] for lane in ranking]
-    overrides = {rr.new_entity_path([*place, "trail"]): trail for place in [["map", "truth"], *places]}
-    hidden = rrb.EntityBehavior(visible=False)
-    return overrides | {rr.new_entity_path(place): hidden for place in places[SHOWN:]}
+def _reception(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> list[Any]:
+    """What the radio said and what was made of it; in front is that which has something to tell."""
+    told = [drawing for drawing in drawn if drawing.shown and drawing.states.state]
+    lanes = [state_view(frame, told)] if told else []
+    eventful = any(len(drawing.states.state) > 1 for drawing in told)
+    return lanes + _radio(frame, run) if eventful else _radio(frame, run) + lanes
 
 
-def _scores() -> Any:  # noqa: ANN401
-    import rerun.blueprint as rrb
-
-    return rrb.TextDocumentView(name="Scores, the best first", origin="/scores")
-
-
-def _plot(frame: Frame, name: str, origin: str, *, top: float | None = None, legend: bool = True) -> Any:  # noqa: ANN401
-    """A plot of the whole run, not only of half a minute around the cursor; ``top``: its values are in [0, top]."""
-    import rerun as rr
-    import rerun.blueprint as rrb
-    from rerun.blueprint.archetypes import PlotBackground
-
-    edge = rrb.TimeRangeBoundary.absolute
-    whole_run = rr.TimeRange(start=edge(seconds=0.0), end=edge(seconds=max(frame.duration_s, 1.0)))
-    return rrb.TimeSeriesView(
-        name=name,
-        origin=origin,
-        axis_x=rrb.TimeAxis(view_range=whole_run),
-        axis_y=None if top is None else rrb.ScalarAxis(range=(-0.04 * top, 1.04 * top)),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
-        background=PlotBackground(color=list(GROUND)),
-    )
-
-
-def _errors(frame: Frame) -> Any:  # noqa: ANN401
-    import rerun.blueprint as rrb
-
-    heading = _plot(frame, "Heading error (°)", "/heading_error")
-    return rrb.Tabs(_plot(frame, "Position error (m)", "/error"), heading, active_tab=0)
-
-
-def _readings(frame: Frame, run: Run) -> Any:  # noqa: ANN401
-    """A tab for each kind of radio reading the run holds."""
-    import rerun.blueprint as rrb
-
+def _radio(frame: Frame, run: Run) -> list[Any]:
+    """A plot for each kind of radio reading the run holds."""
     kinds = {type(measurement) for measurement in run.measurements}
-    views = [_plot(frame, "Ranges (m)", "/ranges")] if Ranges in kinds else []
-    if WifiScan in kinds or not views:
-        views.append(_plot(frame, "Signal strength (dBm)", "/rssi"))
-    return rrb.Tabs(contents=views, active_tab=0)
+    plots = [plot(frame, "Ranges (m)", "/ranges")] if Ranges in kinds else []
+    if WifiScan in kinds or not plots:
+        plots.append(plot(frame, "Signal strength (dBm)", "/rssi"))
+    return plots
 
 
-def _fates(frame: Frame, ranking: Sequence[Lane]) -> Any:  # noqa: ANN401
-    """A tab for each estimator that hears the radio: how far it believed each reading, and how surprising it was.
-
-    The best estimator that tells both is in front.
-    """
+def _details(frame: Frame, drawn: Sequence[Drawing]) -> list[Any]:
+    """A tab for each estimator: does its error fit its claim, and what happened to it?"""
     import rerun as rr
     import rerun.blueprint as rrb
 
-    tabs = []
-    for lane in sorted(ranking, key=lambda lane: not _tells_nis(lane)):
-        if not any(update.fates for update in lane.updates):
-            continue
-        name = lane.name
+    details = []
+    for drawing in (drawing for drawing in drawn if not drawing.ghost):
+        name, views = drawing.name, []
+        if any(drawing.claims):
+            place = ["consistency", name]
+            axes = [
+                (f"{axis.name} error and ±1σ ({axis.unit})", rr.new_entity_path([*place, axis.name])) for axis in AXES
+            ]
+            nees = f"{name}: NEES; 95 % should lie between the lines"
+            views += [tabs([plot(frame, title, origin, legend=False) for title, origin in axes])]
+            views += [plot(frame, nees, rr.new_entity_path(["nees", name]), top=_nees_top(drawing), legend=False)]
+        views += [event_view(name)] if drawing.events.text else []
+        if views:
+            details.append(rrb.Vertical(*views, name=name))
+    return details
+
+
+def _nees_top(drawing: Drawing) -> float:
+    """High enough for nine tenths of a filter's NEES, and for its bounds."""
+    errors = drawing.score.errors
+    nees = np.array([]) if errors is None else errors.nees[np.isfinite(errors.nees)]
+    return max(NEES_SHOWN, quantile(nees, 0.9)) if len(nees) else NEES_SHOWN
+
+
+def _readings(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
+    """The radio in full: what was read, and how far each estimator believed it."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    gates = []
+    for drawing in (drawing for drawing in drawn if drawing.gates):
+        name = drawing.name
         weight = f"{name}: weight of readings, coloured as above"
-        views = [_plot(frame, weight, rr.new_entity_path(["weight", name]), top=1.0, legend=False)]
-        if _tells_nis(lane):
+        views = [plot(frame, weight, rr.new_entity_path(["weight", name]), top=1.0, legend=False)]
+        if drawing.tells_nis:
             nis = f"{name}: NIS of readings; the line is exceeded once in twenty"
-            views.append(_plot(frame, nis, rr.new_entity_path(["nis", name]), top=NIS_SHOWN, legend=False))
-        tabs.append(rrb.Vertical(*views, name=name))
-    return rrb.Tabs(contents=tabs, active_tab=0) if tabs else _plot(frame, "Weight of readings", "/weight")
+            views.append(plot(frame, nis, rr.new_entity_path(["nis", name]), top=NIS_SHOWN, legend=False))
+        gates.append(rrb.Vertical(*views, name=name))
+    return rrb.Vertical(*_radio(frame, run), *([tabs(gates)] if gates else []), name="Radio")
 
 
-def _tells_nis(lane: Lane) -> bool:
-    return any(fate.nis is not None for update in lane.updates for fate in update.fates)
+def _motion(frame: Frame) -> Any:  # noqa: ANN401
+    """The motion sensors as they came."""
+    import rerun.blueprint as rrb
+
+    speeds = plot(frame, "Speed (m/s)", f"/raw/{SPEED}")
+    return rrb.Vertical(speeds, plot(frame, "Turn rate (°/s)", f"/raw/{TURN_RATE}"), name="Motion")

@@ -9,6 +9,8 @@ from __future__ import annotations
 import zlib
 from collections.abc import Mapping
 
+from fusion import World
+
 Colour = tuple[int, int, int]
 
 GROUND: Colour = (20, 22, 26)
@@ -19,6 +21,9 @@ ANCHOR: Colour = (240, 228, 66)
 SKY, VERMILLION, ORANGE = (86, 180, 233), (213, 94, 0), (230, 159, 0)
 PURPLE, BLUE, GREEN, GREY = (204, 121, 167), (0, 114, 178), (0, 158, 115), (150, 150, 150)
 PALETTE: tuple[Colour, ...] = (SKY, VERMILLION, GREEN, PURPLE, ORANGE, BLUE, ANCHOR)
+
+TAKEN, REFUSED, UNSURE, LOST = GREEN, VERMILLION, GREY, PURPLE
+"""Of readings and of states: green and vermillion, which more eyes can tell apart than green and red."""
 
 ESTIMATORS: Mapping[str, Colour] = {
     "dead_reckoning": GREY,
@@ -42,3 +47,9 @@ def colour_of(estimator: str) -> Colour:
     (86, 180, 233)
     """
     return ESTIMATORS.get(estimator) or PALETTE[zlib.crc32(estimator.encode()) % len(PALETTE)]
+
+
+def anchor_colour(world: World, anchor: str) -> Colour:
+    """The colour of an anchor in plots; grey for what is no anchor of the world."""
+    known = [item.id for item in world.anchors]
+    return PALETTE[known.index(anchor) % len(PALETTE)] if anchor in known else GREY

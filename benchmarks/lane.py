@@ -20,7 +20,7 @@ class Lane:
 
     ``updates`` stand in the order of arrival, revisions among them; ``digest`` certifies them. ``cpu_s`` is the
     processor time of the fold alone. ``error`` is None, or why the estimator stopped: ``updates`` ends there then,
-    ``digest`` is empty and ``cpu_s`` zero.
+    ``digest`` is empty and ``cpu_s`` zero. ``ghost_of``: of which estimator this is a counterfactual, None: of none.
     """
 
     name: str
@@ -28,6 +28,7 @@ class Lane:
     digest: str
     cpu_s: float
     error: str | None
+    ghost_of: str | None = None
 
     @cached_property
     def final(self) -> tuple[Update, ...]:

@@ -53,7 +53,7 @@ def _draw(run: Path, names: Sequence[str], scene: Path, png: Path | None, at_s: 
     recorded = cached_run(run)
     lanes = [run_lane(recorded, name, {}, seed) for name in names]
     scores = [score_lane(Cell(run, lane.name, {}, seed), recorded, lane) for lane in lanes]
-    write_scene(scene, recorded, lanes, scores)
+    (scene,) = write_scene(scene, recorded, lanes, scores)
     if png is not None:
         render(scene, png, at_s=at_s)
     return scene

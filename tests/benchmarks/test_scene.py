@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import fusion
+from benchmarks.canvas import MOST_POSES, thinned
 from benchmarks.cell import Cell, score_lane
 from benchmarks.colours import ESTIMATORS, colour_of
 from benchmarks.lane import run_lane
-from benchmarks.scene import MOST_POSES, markdown, mostly_jumps, thinned, write_scene
+from benchmarks.paths import mostly_jumps
+from benchmarks.scene import markdown, write_scene
 from fusion import (
     Covariance,
     Decision,
@@ -103,7 +105,7 @@ def review_of(tmp_path, *names, with_truth=True):
     from rerun.chunk import RrdReader
 
     run = run_of(tmp_path, with_truth=with_truth)
-    scene = write_scene(tmp_path / "review.rrd", run, *scored(run, names))
+    (scene,) = write_scene(tmp_path / "review.rrd", run, *scored(run, names))
     chunks = {}
     for chunk in RrdReader(scene).stream().to_chunks():
         chunks.setdefault(str(chunk.entity_path), []).append(chunk.to_record_batch())
@@ -160,10 +162,11 @@ def test_run_without_truth_is_drawn_without_errors(tmp_path):
     assert not any(path.startswith(("/error", "/map/truth", "/map/legend/truth")) for path in chunks)
 
 
-def test_estimator_without_answers_and_crashed_one_stand_in_the_scores_only(tmp_path):
+def test_estimator_without_answers_and_crashed_one_have_a_legend_and_no_track(tmp_path):
     chunks = review_of(tmp_path, "silent", "broken")
-    assert not any(path.startswith(("/map/estimate", "/error")) for path in chunks)
-    assert "/scores" in chunks
+    assert not any(path.startswith(("/error", "/cdf/estimate", "/map/estimate/broken")) for path in chunks)
+    assert not any(path.endswith(("/path", "/pose", "/error")) for path in chunks if path.startswith("/map/estimate"))
+    assert {"/scores", "/map/legend/silent", "/map/legend/broken"} <= chunks.keys()
 
 
 def test_score_table_ranks_the_live_first_and_tells_the_crash(tmp_path):

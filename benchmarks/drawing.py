@@ -1,0 +1,148 @@
+"""One lane as it is drawn: everything it said turned into columns once, and its errors at the evaluation instants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.canvas import thinned
+from benchmarks.cell import Score
+from benchmarks.colours import Colour, colour_of
+from benchmarks.events import Events, States, events, states
+from benchmarks.fates import FateColumns, fate_columns
+from benchmarks.instants import Answers, Floats, Instants, Stamps, evaluation_instants, match, wrap_angles
+from benchmarks.lane import Lane
+from benchmarks.table import ranked
+from fusion import Reason, Update
+from logs.run import Run
+
+SHOWN = 6
+"""Tracks that are switched on, the best ones: more cannot be told apart. The eye beside an entity shows the others."""
+
+
+class Track(NamedTuple):
+    """The valid positions of a lane, thinned: all (n,); ``covariance`` (n, 6) of (x, y, heading) row by row above the
+    diagonal [m², m rad, rad²], NaN where none is claimed.
+    """
+
+    time_ns: Stamps
+    xy: Floats
+    covariance: Floats
+
+
+def track_of(updates: Sequence[Update]) -> Track:
+    """Of ``updates`` in time order."""
+    valid = np.fromiter((update.estimate.valid for update in updates), np.bool_, len(updates))
+    chosen = [updates[i].estimate for i in thinned(np.flatnonzero(valid))]
+    time_ns = np.array([estimate.time_ns for estimate in chosen], dtype=np.int64)
+    xy = np.array([estimate.pose[:2] for estimate in chosen], dtype=np.float64).reshape(-1, 2)
+    none = (np.nan,) * 6
+    covariance = np.array([estimate.covariance or none for estimate in chosen], dtype=np.float64).reshape(-1, 6)
+    finite = np.isfinite(xy).all(axis=1)
+    return Track(time_ns[finite], xy[finite], covariance[finite])
+
+
+class SignedErrors(NamedTuple):
+    """Estimate minus truth, x, y and heading (n, 3) [m, m, rad], and what is claimed of its variance (n, 3); NaN where
+    there is no valid answer, or no claim.
+    """
+
+    error: Floats
+    variance: Floats
+
+
+def signed_errors(instants: Instants, answers: Answers) -> SignedErrors:
+    """Of ``answers``, which belong to ``instants`` one by one."""
+    turn = wrap_angles(answers.heading - instants.heading)
+    error = np.column_stack([answers.x - instants.x, answers.y - instants.y, turn])
+    variance = np.diagonal(answers.covariance, axis1=1, axis2=2)
+    known = answers.valid[:, None] & np.isfinite(error)
+    return SignedErrors(np.where(known, error, np.nan), np.where(known & np.isfinite(variance), variance, np.nan))
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A lane with its score. ``rank`` counts from 0, the best. ``instants`` and ``answers`` belong together; they are
+    None where there is nothing to compare: no truth, or a lane that crashed.
+    """
+
+    lane: Lane
+    score: Score
+    rank: int
+    shown: bool
+    instants: Instants | None
+    answers: Answers | None
+
+    @property
+    def name(self) -> str:
+        """The lane's name."""
+        return self.lane.name
+
+    @property
+    def ghost(self) -> bool:
+        """Whether it shows what would have been, and is drawn thin."""
+        return self.lane.ghost_of is not None
+
+    @property
+    def colour(self) -> Colour:
+        """A ghost has the colour of what it is a ghost of."""
+        return colour_of(self.lane.ghost_of or self.lane.name)
+
+    @cached_property
+    def track(self) -> Track:
+        """The path."""
+        return track_of(self.lane.final)
+
+    @cached_property
+    def fates(self) -> FateColumns:
+        """What became of the readings; of a ghost's nothing is shown."""
+        return fate_columns(() if self.ghost else self.lane.final)
+
+    @cached_property
+    def states(self) -> States:
+        """When its state changed; of a ghost nothing."""
+        return states(() if self.ghost else self.lane.final, self.fates)
+
+    @cached_property
+    def events(self) -> Events:
+        """What happened to it; of a ghost nothing."""
+        return events(() if self.ghost else self.lane.final, self.fates)
+
+    @property
+    def gates(self) -> bool:
+        """Whether it listens to the radio at all, so that there is a weight to show."""
+        return not bool(self.fates.of(Reason.KIND_NOT_CONSUMED).all())
+
+    @property
+    def tells_nis(self) -> bool:
+        """Whether any reading has an NIS."""
+        return bool(np.isfinite(self.fates.nis).any())
+
+    @cached_property
+    def errors(self) -> SignedErrors | None:
+        """Its errors and what it claims of them."""
+        return None if self.instants is None or self.answers is None else signed_errors(self.instants, self.answers)
+
+    @property
+    def claims(self) -> list[bool]:
+        """Whether it ever claims a variance of x, y and heading."""
+        return [False] * 3 if self.errors is None else [bool(np.isfinite(v).any()) for v in self.errors.variance.T]
+
+
+def drawings(run: Run, lanes: Sequence[Lane], scores: Sequence[Score]) -> list[Drawing]:
+    """The lanes with their scores, one by one, the best first. Ghosts were asked for, so they are always shown."""
+    instants = None if run.truth is None else evaluation_instants(run.truth)
+    by_name = {lane.name: lane for lane in lanes}
+    ranking = [(by_name[score.estimator], score) for score in ranked(scores)]
+    best = [lane.name for lane, _ in ranking if lane.ghost_of is None][:SHOWN]
+    drawn = []
+    for rank, (lane, score) in enumerate(ranking):
+        shown = lane.ghost_of is not None or lane.name in best
+        compared = instants if score.errors is not None and lane.error is None else None
+        answers = None if compared is None else match(compared, lane.updates)
+        drawn.append(Drawing(lane, score, rank, shown, compared, answers))
+    return drawn

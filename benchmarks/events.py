@@ -1,0 +1,128 @@
+"""What happened to an estimator, in words: the state it was in, and the events worth a line.
+
+States are told by what became of radio readings and by what the estimates claim, so they mean the same for every
+method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum, unique
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.fates import MEMBERS, Codes, FateColumns
+from benchmarks.instants import Stamps
+from fusion import Decision, Reason, Update
+
+LOST_PROBABILITY = 0.5
+"""An estimator that is more likely lost than not, is."""
+OWN_REFUSALS = (Reason.TOO_FEW_ANCHORS, Reason.COLLINEAR_ANCHORS)
+"""Unusable by the estimator's own judgement; the host's refusals say nothing about the estimator."""
+
+
+@unique
+class State(Enum):
+    """INIT: no position yet, or no reading heard yet. ACCEPT, REJECT: something, or nothing, of the last scan was
+    taken. LOST: no valid position, or the estimator itself says so.
+    """
+
+    INIT = 0
+    ACCEPT = 1
+    REJECT = 2
+    LOST = 3
+
+
+class States(NamedTuple):
+    """Changes of state: time [ns], and the state from then on."""
+
+    time_ns: Stamps
+    state: list[State]
+
+
+class Events(NamedTuple):
+    """Lines of a log, all (n,), in time order."""
+
+    time_ns: Stamps
+    level: list[str]
+    text: list[str]
+
+
+def states(updates: Sequence[Update], fates: FateColumns) -> States:
+    """The states of a lane; none for a method that never judged a reading and was never lost."""
+    judged = _judged(fates, len(updates))
+    last = np.maximum.accumulate(np.where(judged >= 0, np.arange(len(updates)), 0))
+    state = np.where(np.logical_or.accumulate(judged >= 0), judged[last], State.INIT.value)
+    valid, lost = _claims(updates)
+    state = np.where(np.logical_or.accumulate(valid), state, State.INIT.value)
+    state = np.where(lost | (np.logical_or.accumulate(valid) & ~valid), State.LOST.value, state)
+    if not (state > State.INIT.value).any():
+        return States(np.array([], dtype=np.int64), [])
+    changes = np.flatnonzero(np.diff(state, prepend=-1))
+    return States(_stamps(updates)[changes], [State(code) for code in state[changes].tolist()])
+
+
+def _judged(fates: FateColumns, count: int) -> Codes:
+    """For each update whether its readings were taken (ACCEPT), all refused (REJECT), or not judged (-1)."""
+    taken = fates.of(Decision.USED, Decision.DOWNWEIGHTED)
+    refused = fates.of(Decision.REJECTED) | fates.of(*OWN_REFUSALS)
+    judged = np.full(count, -1, dtype=np.int64)
+    judged[fates.update[refused]] = State.REJECT.value
+    judged[fates.update[taken]] = State.ACCEPT.value
+    return judged
+
+
+def _claims(updates: Sequence[Update]) -> tuple[np.ndarray, np.ndarray]:
+    """Whether each estimate is valid, and whether it is probably lost."""
+    valid = np.array([update.estimate.valid for update in updates], dtype=np.bool_)
+    lost = np.array([(update.estimate.p_lost or 0.0) > LOST_PROBABILITY for update in updates], dtype=np.bool_)
+    return valid, lost
+
+
+def _stamps(updates: Sequence[Update]) -> Stamps:
+    return np.array([update.estimate.time_ns for update in updates], dtype=np.int64)
+
+
+def events(updates: Sequence[Update], fates: FateColumns) -> Events:
+    """Rejected, late and unusable readings, resets, and the position's loss and return."""
+    rows = [*_readings(fates), *_resets(updates), *_losses(updates)]
+    rows.sort()
+    return Events(np.array([row[0] for row in rows], dtype=np.int64), [r[1] for r in rows], [r[2] for r in rows])
+
+
+Row = tuple[int, str, str]
+
+
+def _readings(fates: FateColumns) -> list[Row]:
+    """One line per reading that was not taken; what a method does not listen to is no event."""
+    chosen = fates.of(Decision.REJECTED, Decision.LATE, Decision.UNUSABLE) & ~fates.of(Reason.KIND_NOT_CONSUMED)
+    columns = (fates.time_ns, fates.name, fates.decision, fates.reason, fates.nis)
+    rows = zip(*(column[chosen].tolist() for column in columns), strict=True)
+    return [(t, *_told(name, MEMBERS[decision], MEMBERS[reason], nis)) for t, name, decision, reason, nis in rows]
+
+
+def _told(name: str, decision: Decision | Reason, reason: Decision | Reason, nis: float) -> tuple[str, str]:
+    why = reason.value.replace("_", " ")
+    surprise = f", NIS {nis:.1f}" if np.isfinite(nis) else ""
+    level = "WARN" if decision is Decision.REJECTED else "INFO"
+    return level, f"{name} {decision.value}: {why}{surprise}"
+
+
+def _resets(updates: Sequence[Update]) -> list[Row]:
+    count = np.array([update.estimate.reset_count for update in updates], dtype=np.int64)
+    rows = []
+    for place in np.flatnonzero(np.diff(count, prepend=count[:1]) > 0).tolist():
+        estimate = updates[place].estimate
+        jump = "" if estimate.reset_delta is None else f", moved by {np.hypot(*estimate.reset_delta[:2]):.2f} m"
+        rows.append((estimate.time_ns, "WARN", f"belief replaced (reset {estimate.reset_count}){jump}"))
+    return rows
+
+
+def _losses(updates: Sequence[Update]) -> list[Row]:
+    valid, _ = _claims(updates)
+    rows = []
+    for place in np.flatnonzero(np.diff(valid, prepend=True)).tolist():
+        level, text = ("INFO", "position valid again") if valid[place] else ("ERROR", "no valid position")
+        rows.append((updates[place].estimate.time_ns, level, text))
+    return rows
