@@ -9,41 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.canvas import thinned
 from benchmarks.cell import Score
 from benchmarks.colours import Colour, colour_of
+from benchmarks.columns import EstimateColumns, FateColumns, Track
 from benchmarks.events import Events, States, events, states
-from benchmarks.fates import FateColumns, fate_columns
-from benchmarks.instants import Answers, Floats, Instants, Stamps, evaluation_instants, match, wrap_angles
+from benchmarks.instants import Answers, Floats, Instants, evaluation_instants, match, wrap_angles
 from benchmarks.lane import Lane
 from benchmarks.table import ranked
-from fusion import Reason, Update
+from fusion import Reason
 from logs.run import Run
 
 SHOWN = 6
 """Tracks that are switched on, the best ones: more cannot be told apart. The eye beside an entity shows the others."""
-
-
-class Track(NamedTuple):
-    """The valid positions of a lane, thinned: all (n,); ``covariance`` (n, 6) of (x, y, heading) row by row above the
-    diagonal [m², m rad, rad²], NaN where none is claimed.
-    """
-
-    time_ns: Stamps
-    xy: Floats
-    covariance: Floats
-
-
-def track_of(updates: Sequence[Update]) -> Track:
-    """Of ``updates`` in time order."""
-    valid = np.fromiter((update.estimate.valid for update in updates), np.bool_, len(updates))
-    chosen = [updates[i].estimate for i in thinned(np.flatnonzero(valid))]
-    time_ns = np.array([estimate.time_ns for estimate in chosen], dtype=np.int64)
-    xy = np.array([estimate.pose[:2] for estimate in chosen], dtype=np.float64).reshape(-1, 2)
-    none = (np.nan,) * 6
-    covariance = np.array([estimate.covariance or none for estimate in chosen], dtype=np.float64).reshape(-1, 6)
-    finite = np.isfinite(xy).all(axis=1)
-    return Track(time_ns[finite], xy[finite], covariance[finite])
 
 
 class SignedErrors(NamedTuple):
@@ -95,22 +72,27 @@ class Drawing:
     @cached_property
     def track(self) -> Track:
         """The path."""
-        return track_of(self.lane.final)
+        return Track.of_updates(self.lane.final, self.estimates.valid)
+
+    @cached_property
+    def estimates(self) -> EstimateColumns:
+        """What it said of itself."""
+        return EstimateColumns.of_updates(self.lane.final)
 
     @cached_property
     def fates(self) -> FateColumns:
         """What became of the readings; of a ghost's nothing is shown."""
-        return fate_columns(() if self.ghost else self.lane.final)
+        return FateColumns.of_updates(() if self.ghost else self.lane.final)
 
     @cached_property
     def states(self) -> States:
-        """When its state changed; of a ghost nothing."""
-        return states(() if self.ghost else self.lane.final, self.fates)
+        """When its state changed."""
+        return states(self.estimates, self.fates)
 
     @cached_property
     def events(self) -> Events:
-        """What happened to it; of a ghost nothing."""
-        return events(() if self.ghost else self.lane.final, self.fates)
+        """What happened to it."""
+        return events(self.lane.final, self.estimates, self.fates)
 
     @property
     def gates(self) -> bool:

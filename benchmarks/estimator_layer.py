@@ -81,7 +81,7 @@ def _draw_circles(canvas: Canvas, place: Path, world: World, readings: Heard, dr
     """
     fates, rr = drawing.fates, canvas.rr
     asked = ~fates.of(Reason.KIND_NOT_CONSUMED)
-    radius_m = readings.radii_of(fates.fate)
+    radius_m = np.array([readings.radius_of.get(fate[:4], np.nan) for fate in fates.fates], dtype=np.float64)
     drawn = asked & np.isfinite(radius_m)
     if not drawn.any():
         return

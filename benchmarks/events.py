@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.fates import MEMBERS, Codes, FateColumns
+from benchmarks.columns import MEMBERS, Codes, EstimateColumns, FateColumns
 from benchmarks.instants import Stamps
 from fusion import Decision, Reason, Update
 
@@ -49,18 +49,18 @@ class Events(NamedTuple):
     text: list[str]
 
 
-def states(updates: Sequence[Update], fates: FateColumns) -> States:
+def states(estimates: EstimateColumns, fates: FateColumns) -> States:
     """The states of a lane; none for a method that never judged a reading and was never lost."""
-    judged = _judged(fates, len(updates))
-    last = np.maximum.accumulate(np.where(judged >= 0, np.arange(len(updates)), 0))
-    state = np.where(np.logical_or.accumulate(judged >= 0), judged[last], State.INIT.value)
-    valid, lost = _claims(updates)
-    state = np.where(np.logical_or.accumulate(valid), state, State.INIT.value)
-    state = np.where(lost | (np.logical_or.accumulate(valid) & ~valid), State.LOST.value, state)
+    judged = _judged(fates, len(estimates.valid))
+    last = np.maximum.accumulate(np.where(judged >= 0, np.arange(len(judged)), 0))
+    located = np.logical_or.accumulate(estimates.valid)
+    begun = np.logical_or.accumulate(judged >= 0) & located
+    state = np.where(begun, judged[last], State.INIT.value)
+    state[(located & ~estimates.valid) | (estimates.p_lost > LOST_PROBABILITY)] = State.LOST.value
     if not (state > State.INIT.value).any():
         return States(np.array([], dtype=np.int64), [])
     changes = np.flatnonzero(np.diff(state, prepend=-1))
-    return States(_stamps(updates)[changes], [State(code) for code in state[changes].tolist()])
+    return States(estimates.time_ns[changes], [State(code) for code in state[changes].tolist()])
 
 
 def _judged(fates: FateColumns, count: int) -> Codes:
@@ -73,20 +73,9 @@ def _judged(fates: FateColumns, count: int) -> Codes:
     return judged
 
 
-def _claims(updates: Sequence[Update]) -> tuple[np.ndarray, np.ndarray]:
-    """Whether each estimate is valid, and whether it is probably lost."""
-    valid = np.array([update.estimate.valid for update in updates], dtype=np.bool_)
-    lost = np.array([(update.estimate.p_lost or 0.0) > LOST_PROBABILITY for update in updates], dtype=np.bool_)
-    return valid, lost
-
-
-def _stamps(updates: Sequence[Update]) -> Stamps:
-    return np.array([update.estimate.time_ns for update in updates], dtype=np.int64)
-
-
-def events(updates: Sequence[Update], fates: FateColumns) -> Events:
+def events(updates: Sequence[Update], estimates: EstimateColumns, fates: FateColumns) -> Events:
     """Rejected, late and unusable readings, resets, and the position's loss and return."""
-    rows = [*_readings(fates), *_resets(updates), *_losses(updates)]
+    rows = [*_readings(fates), *_resets(updates, estimates.reset_count), *_losses(estimates)]
     rows.sort()
     return Events(np.array([row[0] for row in rows], dtype=np.int64), [r[1] for r in rows], [r[2] for r in rows])
 
@@ -109,20 +98,16 @@ def _told(name: str, decision: Decision | Reason, reason: Decision | Reason, nis
     return level, f"{name} {decision.value}: {why}{surprise}"
 
 
-def _resets(updates: Sequence[Update]) -> list[Row]:
-    count = np.array([update.estimate.reset_count for update in updates], dtype=np.int64)
+def _resets(updates: Sequence[Update], reset_count: Codes) -> list[Row]:
     rows = []
-    for place in np.flatnonzero(np.diff(count, prepend=count[:1]) > 0).tolist():
+    for place in np.flatnonzero(np.diff(reset_count, prepend=reset_count[:1]) > 0).tolist():
         estimate = updates[place].estimate
         jump = "" if estimate.reset_delta is None else f", moved by {np.hypot(*estimate.reset_delta[:2]):.2f} m"
         rows.append((estimate.time_ns, "WARN", f"belief replaced (reset {estimate.reset_count}){jump}"))
     return rows
 
 
-def _losses(updates: Sequence[Update]) -> list[Row]:
-    valid, _ = _claims(updates)
-    rows = []
-    for place in np.flatnonzero(np.diff(valid, prepend=True)).tolist():
-        level, text = ("INFO", "position valid again") if valid[place] else ("ERROR", "no valid position")
-        rows.append((updates[place].estimate.time_ns, level, text))
-    return rows
+def _losses(estimates: EstimateColumns) -> list[Row]:
+    changes = np.flatnonzero(np.diff(estimates.valid, prepend=True))
+    told = {True: ("INFO", "position valid again"), False: ("ERROR", "no valid position")}
+    return [(t, *told[valid]) for t, valid in zip(*(c[changes].tolist() for c in estimates[:2]), strict=True)]

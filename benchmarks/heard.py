@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.instants import Floats, Stamps
-from fusion import Fate, Measurement, RangeReading, Ranges, RssiReading, WifiScan, World
+from fusion import Measurement, RangeReading, Ranges, RssiReading, WifiScan, World
 
 Identity: TypeAlias = tuple[int, str, int, str]
 """Time [ns], sensor, sequence number and anchor: what names one reading in a run."""
 
 
 class Heard(NamedTuple):
-    """The readings in the order they came, all (n,): ``value`` [dBm] or, where ``is_range``, [m]; ``radius_m``: of
-    the circle around the anchor on which the reading puts the robot, NaN for an anchor the world does not know.
+    """The readings in the order they came, all (n,): ``value`` [dBm] or, where ``is_range``, [m]. ``radius_of``:
+    the radius [m] of the circle around the anchor on which a reading puts the robot, by the reading's identity; NaN for
+    an anchor the world does not know.
     """
 
-    identity: list[Identity]
     time_ns: Stamps
     anchor: NDArray[np.str_]
     is_range: NDArray[np.bool_]
     value: Floats
-    radius_m: Floats
-
-    def radii_of(self, fates: Sequence[Fate]) -> Floats:
-        """The radii that belong to ``fates`` [m], NaN where a fate is not that of a radio reading."""
-        known = dict(zip(self.identity, self.radius_m.tolist(), strict=True))
-        return np.array([known.get((f.time_ns, f.sensor, f.seq, f.anchor), np.nan) for f in fates], dtype=np.float64)
+    radius_of: Mapping[Identity, float]
 
 
 def heard(world: World, measurements: Sequence[Measurement]) -> Heard:
@@ -42,7 +37,8 @@ def heard(world: World, measurements: Sequence[Measurement]) -> Heard:
     anchor = np.array([entry[3] for entry in identity], dtype=np.str_)
     is_range = np.array([isinstance(reading, RangeReading) for reading in readings], dtype=np.bool_)
     value = np.array([_value(reading) for reading in readings], dtype=np.float64)
-    return Heard(identity, time_ns, anchor, is_range, value, _radii(world, anchor, is_range, value))
+    radius_m = _radii(world, anchor, is_range, value)
+    return Heard(time_ns, anchor, is_range, value, dict(zip(identity, radius_m.tolist(), strict=True)))
 
 
 def _value(reading: RssiReading | RangeReading) -> float:
