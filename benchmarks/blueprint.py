@@ -11,6 +11,7 @@ import numpy as np
 
 from benchmarks.drawing import SHOWN, Drawing
 from benchmarks.estimator_plots import AXES
+from benchmarks.events import State
 from benchmarks.frame import TIMELINE, Frame
 from benchmarks.raw_sensors import SPEED, TURN_RATE
 from benchmarks.score import quantile
@@ -60,7 +61,7 @@ def _reception(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> list[Any]:
     """What the radio said and what was made of it; in front is that which has something to tell."""
     told = [drawing for drawing in drawn if drawing.shown and drawing.states.state]
     lanes = [state_view(frame, told)] if told else []
-    eventful = any(len(drawing.states.state) > 1 for drawing in told)
+    eventful = any(state in (State.REJECT, State.LOST) for drawing in told for state in drawing.states.state)
     return lanes + _radio(frame, run) if eventful else _radio(frame, run) + lanes
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.canvas import STRONG, Canvas
-from benchmarks.colours import GREY, WALL
+from benchmarks.colours import TRUTH, WALL
 from benchmarks.drawing import Drawing
 from benchmarks.instants import Floats
 from benchmarks.score import quantile
@@ -63,7 +63,7 @@ def draw_axes(canvas: Canvas, axes: CdfAxes) -> None:
     canvas.style(["cdf", "grid"], rr.LineStrips2D(grid, colors=[(*WALL, 120)], radii=[-0.5], draw_order=-20))
     places = [(x, -0.03) for x in columns] + [(-0.09, y + 0.03) for y in SHARES]
     texts = [f"{error:g} m" for error in across] + [f"{100 * y:.0f} %" for y in SHARES]
-    look = {"colors": [(*GREY, STRONG)], "radii": [-0.1], "labels": texts, "show_labels": True}
+    look = {"colors": [(*TRUTH, STRONG)], "radii": [-0.1], "labels": texts, "show_labels": True}
     canvas.style(["cdf", "ticks"], rr.Points2D(places, **look))
 
 

@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 from benchmarks.bench import bench, pooled, remarks, write_records
 from benchmarks.cell import Score
-from benchmarks.picture import has_display, open_viewer, render
+from benchmarks.picture import render
 from benchmarks.review import review
 from benchmarks.table import print_tables
+from benchmarks.viewer import has_display, open_viewer
 from fusion import ViewerError
 from sensors.simulate import simulate
 
@@ -54,8 +55,8 @@ def _draw(log: Path, folder: Path, seed: int) -> tuple[Path | None, Path | None]
     scene: Path | None = None
     try:
         _tell("drawing the review")
-        scene = review(log, save=folder / "review.rrd", seed=seed)
-        return scene, render(scene, folder / "review.png")
+        (scene,) = review(log, save=folder / "review.rrd", seed=seed).files
+        return scene, render([scene], folder / "review.png")
     except ViewerError as error:
         _tell(f"no {'picture' if scene else 'review'}: {error}")
         return scene, None
@@ -80,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
         if path is not None:
             sys.stdout.write(f"{path}\n")
     if made.scene is not None and not arguments.no_view and has_display():
-        open_viewer(made.scene)
+        open_viewer([made.scene])
     sys.stdout.write(_next(made))
     return 1 if all(score.status == "crashed" for score in made.scores) else 0
 

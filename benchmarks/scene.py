@@ -23,8 +23,8 @@ from benchmarks.estimator_plots import draw_over_time
 from benchmarks.frame import Frame
 from benchmarks.heard import heard
 from benchmarks.lane import Lane
-from benchmarks.picture import require_rerun
 from benchmarks.table import COLUMNS, as_text, ranked
+from benchmarks.viewer import require_rerun
 from fusion import FusionError
 from logs.run import Run
 
