@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from benchmarks.colours import Colour
 from benchmarks.frame import TIMELINE
-from benchmarks.instants import Floats, Stamps
+from benchmarks.track import Floats, Stamps
 
 MOST_POSES = 6000
 """Poses of one drawn track: more cost the viewer time and show nothing. Scores are never thinned."""

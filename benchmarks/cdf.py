@@ -15,8 +15,8 @@ import numpy as np
 from benchmarks.canvas import STRONG, Canvas
 from benchmarks.colours import TRUTH, WALL
 from benchmarks.drawing import Drawing
-from benchmarks.instants import Floats
 from benchmarks.score import quantile
+from benchmarks.track import Floats
 
 WIDTH = 1.6
 """The picture is this wide and 1 high, for a 2D view keeps proportions."""

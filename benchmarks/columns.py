@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.canvas import thinned
-from benchmarks.instants import Floats, Stamps
+from benchmarks.track import Floats, Stamps
 from fusion import Decision, Fate, Reason, Update
 
 MEMBERS = (*Decision, *Reason)
@@ -27,7 +27,7 @@ def _field(rows: Sequence[tuple[Any, ...]], place: int) -> Iterator[Any]:
     return map(itemgetter(place), rows)
 
 
-class FateColumns(NamedTuple):
+class DrawnFates(NamedTuple):
     """The ``fates`` of a lane in time order, all (n,). ``update``: the index of their update in ``Lane.final``;
     ``name``: the anchor, or the sensor of a reading without one; ``nis``: NaN where there is none.
     """
@@ -42,7 +42,7 @@ class FateColumns(NamedTuple):
     nis: Floats
 
     @classmethod
-    def of_updates(cls, updates: Sequence[Update]) -> FateColumns:
+    def of_updates(cls, updates: Sequence[Update]) -> DrawnFates:
         """The fates of ``updates``, which stand in time order."""
         by_update = [update.fates for update in updates]
         fates = list(chain.from_iterable(by_update))
@@ -85,7 +85,7 @@ class EstimateColumns(NamedTuple):
         )
 
 
-class Track(NamedTuple):
+class DrawnTrack(NamedTuple):
     """The valid positions of a lane, thinned: all (n,); ``covariance`` (n, 6) of (x, y, heading) row by row above the
     diagonal [m², m rad, rad²], NaN where none is claimed.
     """
@@ -95,7 +95,7 @@ class Track(NamedTuple):
     covariance: Floats
 
     @classmethod
-    def of_updates(cls, updates: Sequence[Update], valid: Flags) -> Track:
+    def of_updates(cls, updates: Sequence[Update], valid: Flags) -> DrawnTrack:
         """Of ``updates`` in time order; ``valid`` (n,): which of them hold a position."""
         chosen = [updates[i].estimate for i in thinned(np.flatnonzero(valid))]
         time_ns = np.array([estimate.time_ns for estimate in chosen], dtype=np.int64)

@@ -9,9 +9,9 @@ from benchmarks.canvas import STRONG, Canvas, Path, thinned
 from benchmarks.colours import ANCHOR, REFUSED
 from benchmarks.drawing import Drawing
 from benchmarks.heard import Heard
-from benchmarks.instants import Floats
 from benchmarks.paths import draw_path
 from benchmarks.score import CHI_SQUARE_95
+from benchmarks.track import Floats
 from fusion import Reason, World
 
 CIRCLE_OPACITY = 130

@@ -11,7 +11,7 @@ from benchmarks.colours import LOST, REFUSED, TAKEN, TRUTH, UNSURE, anchor_colou
 from benchmarks.drawing import Drawing
 from benchmarks.events import State
 from benchmarks.frame import Frame
-from benchmarks.instants import Floats, Stamps
+from benchmarks.track import Floats, Stamps
 from fusion import Reason, World
 from fusion.values import NANOSECONDS
 

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.columns import MEMBERS, Codes, EstimateColumns, FateColumns
-from benchmarks.instants import Stamps
+from benchmarks.columns import MEMBERS, Codes, DrawnFates, EstimateColumns
+from benchmarks.track import Stamps
 from fusion import Decision, Reason, Update
 
 LOST_PROBABILITY = 0.5
@@ -49,7 +49,7 @@ class Events(NamedTuple):
     text: list[str]
 
 
-def states(estimates: EstimateColumns, fates: FateColumns) -> States:
+def states(estimates: EstimateColumns, fates: DrawnFates) -> States:
     """The states of a lane; none for a method that never judged a reading and was never lost."""
     judged = _judged(fates, len(estimates.valid))
     last = np.maximum.accumulate(np.where(judged >= 0, np.arange(len(judged)), 0))
@@ -63,7 +63,7 @@ def states(estimates: EstimateColumns, fates: FateColumns) -> States:
     return States(estimates.time_ns[changes], [State(code) for code in state[changes].tolist()])
 
 
-def _judged(fates: FateColumns, count: int) -> Codes:
+def _judged(fates: DrawnFates, count: int) -> Codes:
     """For each update whether its readings were taken (ACCEPT), all refused (REJECT), or not judged (-1)."""
     taken = fates.of(Decision.USED, Decision.DOWNWEIGHTED)
     refused = fates.of(Decision.REJECTED) | fates.of(*OWN_REFUSALS)
@@ -73,7 +73,7 @@ def _judged(fates: FateColumns, count: int) -> Codes:
     return judged
 
 
-def events(updates: Sequence[Update], estimates: EstimateColumns, fates: FateColumns) -> Events:
+def events(updates: Sequence[Update], estimates: EstimateColumns, fates: DrawnFates) -> Events:
     """Rejected, late and unusable readings, resets, and the position's loss and return."""
     rows = [*_readings(fates), *_resets(updates, estimates.reset_count), *_losses(estimates)]
     rows.sort()
@@ -83,7 +83,7 @@ def events(updates: Sequence[Update], estimates: EstimateColumns, fates: FateCol
 Row = tuple[int, str, str]
 
 
-def _readings(fates: FateColumns) -> list[Row]:
+def _readings(fates: DrawnFates) -> list[Row]:
     """One line per reading that was not taken; what a method does not listen to is no event."""
     chosen = fates.of(Decision.REJECTED, Decision.LATE, Decision.UNUSABLE) & ~fates.of(Reason.KIND_NOT_CONSUMED)
     columns = (fates.time_ns, fates.name, fates.decision, fates.reason, fates.nis)

@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.instants import Floats, Stamps
+from benchmarks.track import Floats, Stamps
 from fusion import Measurement, RangeReading, Ranges, RssiReading, WifiScan, World
 
 Identity: TypeAlias = tuple[int, str, int, str]

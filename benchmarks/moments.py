@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.columns import MEMBERS, FateColumns, Flags
+from benchmarks.columns import MEMBERS, DrawnFates, Flags
 from benchmarks.drawing import Drawing
 from benchmarks.events import OWN_REFUSALS
-from benchmarks.instants import MAX_AGE_S, Floats, Stamps
+from benchmarks.instants import MAX_AGE_S
+from benchmarks.track import Floats, Stamps
 from fusion import Decision, Odometry, Reason, WheelTicks
 from fusion.values import nanoseconds, seconds
 from logs.run import Run
@@ -109,7 +110,7 @@ def _of_estimates(drawing: Drawing, at_ns: int) -> Iterator[str]:
         yield f"belief replaced {resets} times" if resets > 1 else "belief replaced"
 
 
-def _of_reception(fates: FateColumns, at_ns: int) -> Iterator[str]:
+def _of_reception(fates: DrawnFates, at_ns: int) -> Iterator[str]:
     """Silence, or too few anchors at once: of what the host let through."""
     heard = fates.of(Decision.USED, Decision.DOWNWEIGHTED, Decision.REJECTED) | fates.of(*OWN_REFUSALS)
     time_ns, names = fates.time_ns[heard], fates.name[heard]
@@ -139,7 +140,7 @@ def _last_view(time_ns: list[int], names: list[str]) -> int | None:
     return None
 
 
-def _of_judgement(fates: FateColumns, at_ns: int) -> Iterator[str]:
+def _of_judgement(fates: DrawnFates, at_ns: int) -> Iterator[str]:
     """What became of the readings just before."""
     recent = (fates.time_ns <= at_ns) & (fates.time_ns > at_ns - nanoseconds(JUST_BEFORE_S))
     recent &= ~fates.of(Reason.KIND_NOT_CONSUMED)
@@ -155,7 +156,7 @@ def _of_judgement(fates: FateColumns, at_ns: int) -> Iterator[str]:
         yield f"{fates.name[worst]} taken with NIS {fates.nis[worst]:.1f}"
 
 
-def _reasons(fates: FateColumns, chosen: Flags) -> str:
+def _reasons(fates: DrawnFates, chosen: Flags) -> str:
     return ", ".join(sorted({MEMBERS[code].value.replace("_", " ") for code in fates.reason[chosen].tolist()}))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.canvas import FAINT, STRONG, Canvas, Path, thinned
 from benchmarks.colours import Colour
-from benchmarks.instants import Floats, Stamps
+from benchmarks.track import Floats, Stamps
 from fusion.values import NANOSECONDS
 
 JUMP_M_S = 5.0

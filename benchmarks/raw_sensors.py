@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.canvas import Canvas
 from benchmarks.colours import PALETTE
-from benchmarks.instants import Floats, Stamps
+from benchmarks.track import Floats, Stamps
 from fusion import Gyro, Measurement, MotorCommand, Odometry, WheelTicks, World
 from fusion.values import NANOSECONDS
 
