@@ -42,6 +42,7 @@ GROUPS = {
     "bench": {
         "plan": Verb("benchmarks.runner.plan_verb", "what a suite would compute, and what of it is there"),
         "run": Verb("benchmarks.runner.run_verb", "compute what is missing of a suite"),
+        "time": Verb("benchmarks.runner.time_verb", "what each estimator costs, measured alone"),
         "report": Verb("benchmarks.report.verb", "the results as one HTML page"),
         "compare": Verb("benchmarks.runner.compare_verb", "which estimator is better, or that the runs cannot tell"),
         "gate": Verb("benchmarks.runner.gate_verb", "may a change land? judged against a baseline"),

@@ -10,6 +10,7 @@ import numpy as np
 from benchmarks.plotting import label, panels, plain_colour, plain_ticks
 from benchmarks.report.material import Material
 from benchmarks.runner.results import by_contestant, score_matrix
+from benchmarks.score import quantile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -115,6 +116,24 @@ def maps(material: Material) -> Figure:
     return figure
 
 
+def cost(material: Material) -> Figure:
+    """Accuracy against processor time, where `fusion bench time` has measured it: lower left is better."""
+    figure, (axes,) = panels(1, 3.6)
+    grouped = by_contestant(material.results)
+    for name, least_us in material.timing.items():
+        if name in grouped:
+            score = quantile(np.median(score_matrix(grouped[name], material.metric), axis=1), 0.5)
+            if np.isfinite(score):
+                axes.scatter(least_us, 100.0 * score, color=plain_colour(_use(material, name)), s=30)
+                axes.annotate(name, (least_us, 100.0 * score), textcoords="offset points", xytext=(5, 3), fontsize=8)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    plain_ticks(axes.xaxis)
+    plain_ticks(axes.yaxis)
+    label(axes, "accuracy against cost", "processor time per measurement, µs", f"{material.metric}, cm")
+    return figure
+
+
 def _style(material: Material, name: str) -> dict[str, Any]:
     """The colour of the estimator; its contestants are told apart by their lines."""
     use = _use(material, name)
@@ -135,4 +154,5 @@ FIGURES: Mapping[str, Callable[[Material], Figure]] = {
     "summary": summary,
     "over_time": over_time,
     "maps": maps,
+    "cost": cost,
 }

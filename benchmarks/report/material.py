@@ -13,6 +13,7 @@ from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.results import RANKED_BY, Result, by_contestant, comparison, median_metrics
 from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store
+from benchmarks.runner.time_verb import read_timing
 from benchmarks.track import Floats, from_bytes
 from benchmarks.verdict import Comparison
 from fusion import ParameterError
@@ -64,6 +65,11 @@ class Material:
             return comparison(self.results, self.metric)
         except ParameterError:
             return None
+
+    @cached_property
+    def timing(self) -> dict[str, float]:
+        """µs per measurement by contestant, empty when it was never measured."""
+        return read_timing(self._store.folder)
 
     @cached_property
     def scored_runs(self) -> list[str]:

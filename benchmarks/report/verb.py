@@ -32,6 +32,7 @@ EXPLAINED = {
     ),
     "over_time": "Gaps are instants without a valid answer.",
     "maps": "The best estimator's track, coloured by its error, over the true path; triangles are anchors.",
+    "cost": "Measured alone on one machine by `fusion bench time`. Lower left is better.",
 }
 
 
@@ -46,6 +47,8 @@ def report(material: Material, command: str) -> str:
     parts = [f"# {suite.name}", *_verdicts(material), about, *map(as_markdown, _sheets(material))]
     if material.scored_runs:
         for name, draw in FIGURES.items():
+            if name == "cost" and not material.timing:
+                continue
             parts.append(f"![{name}]({inline_png(as_png(draw(material)))})\n\n{EXPLAINED[name]}")
     return "\n\n".join([*parts, *_provenance(material, command)]) + "\n"
 

@@ -57,11 +57,21 @@ def material(place):
 
 def test_page_holds_verdicts_tables_figures_and_provenance(material):
     page = report(material, "fusion bench run suite.toml")
-    assert page.count("data:image/png;base64,") == len(FIGURES)
+    assert page.count("data:image/png;base64,") == len(FIGURES) - (not material.timing)
     for part in ("Leaderboard", "Pairs on pos_p75", "Faults", "Worst moments", "Lost cells", "Runs", "Estimators"):
         assert f"**{part}" in page
     assert "wheels" in page.splitlines()[2]
     assert "fusion bench run suite.toml" in page
+
+
+def test_cost_is_drawn_once_it_was_measured(place, capsys):
+    words = [str(place / "suite.toml"), "--store", str(place / "store")]
+    assert main(["bench", "time", *words, "--repeats", "1"]) == 0
+    assert "wheels" in capsys.readouterr().out
+    suite, store = load_suite(place / "suite.toml"), Store(place / "store")
+    timed = Material(suite, read_results(cells_of(suite, store), store), store)
+    assert timed.timing.keys() == {"wheels", "radio"}
+    assert report(timed, "").count("data:image/png;base64,") == len(FIGURES)
 
 
 def test_radio_without_radio_is_lost_and_said_to_be(material):
