@@ -7,19 +7,21 @@ from __future__ import annotations
 
 import math
 import platform
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 import fusion
+from benchmarks.innovations import innovation_metrics
 from benchmarks.instants import evaluation_instants, match
 from benchmarks.lane import Lane, run_lane
-from benchmarks.score import Errors, errors, metrics
-from benchmarks.track import Track
+from benchmarks.score import Errors, errors, for_json, metrics, quantile
+from fusion import Decision, Estimate
 from logs.reader import read_run
 from logs.run import Run
 
@@ -49,7 +51,7 @@ class Score:
     errors: Errors | None = None
     facts: Mapping[str, object] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def metrics(self) -> dict[str, float]:
         """Metrics by id (`benchmarks.score`); empty without truth."""
         return {} if self.errors is None else metrics(self.errors)
@@ -60,9 +62,8 @@ class Score:
         JSON knows neither infinity nor NaN. Both are None: read them with ``status`` (a median that is infinite
         makes it ``diverged``) and ``availability`` (below 0.75, ``pos_p75`` is infinite).
         """
-        scores = {key: value if math.isfinite(value) else None for key, value in self.metrics.items()}
         head = {"run": self.run, "estimator": self.estimator, "status": self.status, "error": self.error}
-        return {**head, **scores, **self.facts}
+        return {**head, **for_json(self.metrics), **self.facts}
 
 
 @lru_cache(maxsize=1)
@@ -102,24 +103,25 @@ def _errors(run: Run, lane: Lane) -> Errors | None:
     instants = evaluation_instants(run.truth)
     if len(instants.time_ns) == 0:
         return None
-    return errors(instants, match(instants, lane.track))
+    return errors(instants, match(instants, () if lane.error else lane.updates))
 
 
 def _status(lane: Lane, measured: Errors | None) -> str:
     if lane.error is not None:
         return "crashed"
-    return status_of(lane.track, {} if measured is None else metrics(measured))
-
-
-def status_of(track: Track, measured: Mapping[str, float]) -> str:
-    """How a lane that was not lost ended; ``measured`` are its metrics, empty without truth."""
-    if not track.is_sound:
+    if not all(_is_sound(update.estimate) for update in lane.updates):
         return "diverged"
-    if not measured:
+    if measured is None:
         return "unscored"
+    available = float(np.isfinite(measured.position).mean())
     # Fewer than half of the answers valid is also what makes the median infinite.
-    lost = measured["availability"] < LEAST_AVAILABILITY or not math.isfinite(measured["pos_p50"])
-    return "diverged" if lost else "ok"
+    return "diverged" if available < LEAST_AVAILABILITY or not math.isfinite(quantile(measured.position, 0.5)) else "ok"
+
+
+def _is_sound(estimate: Estimate) -> bool:
+    """What an estimator does not claim, a position not valid or a heading not known, may be any number."""
+    x, y, heading = map(math.isfinite, estimate.pose)
+    return not estimate.valid or (x and y and (heading or not estimate.heading_known))
 
 
 def _facts(cell: Cell, run: Run) -> dict[str, object]:
@@ -136,13 +138,17 @@ def _facts(cell: Cell, run: Run) -> dict[str, object]:
 
 
 def _cost(run: Run, lane: Lane) -> dict[str, object]:
-    """What needs no truth: digest, processor time, fates and the mean NIS of the last word on each measurement."""
+    """What needs no truth: digest, processor time, and of the last word on each measurement fates and innovations."""
     if lane.error is not None:
         return {}
+    fates = [fate for update in lane.final for fate in update.fates]
+    decisions = Counter(fate.decision for fate in fates)
+    nis = [fate.nis for fate in fates if fate.nis is not None]
     return {
         "digest": lane.digest,
         "cpu_s": lane.cpu_s,
         "cpu_per_measurement_s": lane.cpu_s / len(run.measurements) if run.measurements else None,
-        "fates": lane.fates.counts,
-        "nis_mean": lane.fates.nis_mean,
+        "fates": {decision.value: decisions[decision] for decision in Decision},
+        "nis_mean": float(np.mean(nis)) if nis and np.isfinite(nis).all() else None,
+        **for_json(innovation_metrics(lane.final)),
     }
