@@ -152,7 +152,7 @@ def match(instants: Instants, updates: Sequence[Update], *, max_age_s: float = M
     stamp_ns = np.array([update.estimate.time_ns for update in updates], dtype=np.int64)
     chosen, heard = _newest(instants, stamp_ns, received_ns)
     said = track_of([updates[i].estimate for i in chosen])
-    fixes_ns = np.array([update.measurement.time_ns if is_fix(update) else BEFORE_ALL_NS for update in updates])
+    fixes_ns = np.array([update.measurement.time_ns if _is_fix(update) else BEFORE_ALL_NS for update in updates])
     return _answers(instants, said, heard, _since_fix_s(instants, received_ns, fixes_ns), max_age_s)
 
 
@@ -171,7 +171,7 @@ def _newest(instants: Instants, stamp_ns: Whole, received_ns: Whole) -> tuple[Wh
     return newest[np.maximum(received, 0)] if len(newest) else newest, heard
 
 
-def is_fix(update: Update) -> bool:
+def _is_fix(update: Update) -> bool:
     """Whether a radio measurement, which alone knows where the robot is, was believed, at least in part."""
     if not isinstance(update.measurement, WifiScan | Ranges):
         return False

@@ -47,13 +47,15 @@ def _of_one_run(series: Floats) -> Floats:
 def _of_rows(series: Floats) -> Floats:
     """NaN for a row that never changes. Autocorrelations by Fourier transform (Wiener & Khinchin), single precision."""
     count = series.shape[1]
+    spans = np.ptp(series, axis=1)
+    changing = series[spans > 0.0]
+    scaled = (changing - changing.mean(axis=1, keepdims=True)) / spans[spans > 0.0, None]
     lags = max(count // 4 * 2, 2)
-    centred = (series - series.mean(axis=1, keepdims=True)).astype(np.float32)
-    spectrum = rfft(centred, next_fast_len(count + lags, real=True))
-    covariance = irfft(spectrum.real**2 + spectrum.imag**2, next_fast_len(count + lags, real=True))[:, :lags]
+    length = next_fast_len(count + lags, real=True)
+    spectrum = rfft(scaled.astype(np.float32), length)
+    covariance = irfft(spectrum.real**2 + spectrum.imag**2, length)[:, :lags]
     sizes = np.full(len(series), np.nan)
-    changes = series.max(axis=1) > series.min(axis=1)
-    sizes[changes] = count / _time(covariance[changes])
+    sizes[spans > 0.0] = count / _time(covariance)
     return sizes
 
 

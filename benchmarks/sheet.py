@@ -35,15 +35,17 @@ def console(file: IO[str] | None = None) -> Console:
 def print_sheets(sheets: Sequence[Sheet], file: IO[str] | None = None) -> None:
     """For a terminal, or a file of 120 columns."""
     from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
     from rich.table import Table
 
     output = console(file)
     for sheet in sheets:
-        table = Table(title=sheet.title, box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
+        # What stands in brackets, as a unit may, is text and no markup.
+        table = Table(title=escape(sheet.title), box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
         for place, title in enumerate(sheet.head):
-            table.add_column(title, justify="left" if place == 0 or sheet.prose else "right")
+            table.add_column(escape(title), justify="left" if place == 0 or sheet.prose else "right")
         for row in sheet.rows:
-            table.add_row(*row)
+            table.add_row(*map(escape, row))
         output.print(table)
 
 

@@ -1,0 +1,135 @@
+"""``fusion bench score``: how good a track in one file is against the truth in another."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import IO, NamedTuple
+
+import numpy as np
+
+from benchmarks.alignment import ALIGNMENTS, align
+from benchmarks.instants import GAP_S, MAX_AGE_S, RATE_HZ, Answers, Floats, Instants, evaluation_instants, match_track
+from benchmarks.interpolation import meet
+from benchmarks.score import errors, for_json, metrics
+from benchmarks.tracks import read_track, read_truth
+from fusion import FusionError, LogError, ParameterError, Pose
+from fusion.errors import did_you_mean
+
+MODES = ("causal", "interp")
+
+
+class PairScore(NamedTuple):
+    """The score of one track: ``metrics`` raw, ``aligned`` after ``map_from_estimate`` moved the estimate.
+
+    Both are None without alignment; where one was asked for and is impossible, ``align`` says so all the same.
+    """
+
+    truth: str
+    estimate: str
+    mode: str
+    align: str
+    metrics: dict[str, float]
+    aligned: dict[str, float] | None = None
+    map_from_estimate: Pose | None = None
+
+    @property
+    def ratio(self) -> float:
+        """RMSE raw over aligned: how much of the error alignment hides; NaN without alignment."""
+        if self.aligned is None:
+            return math.nan
+        return float(np.divide(self.metrics["pos_rmse"], self.aligned["pos_rmse"]))
+
+    def record(self) -> dict[str, object]:
+        """Everything for strict JSON, in m, s and rad; what is infinite or does not exist is None."""
+        aligned = None
+        if self.aligned is not None and self.map_from_estimate is not None:
+            transform = dict(zip(("x_m", "y_m", "yaw_rad"), self.map_from_estimate, strict=True))
+            aligned = {**transform, **for_json({"ratio": self.ratio, **self.aligned})}
+        head = {"truth": self.truth, "estimate": self.estimate, "mode": self.mode, "align": self.align}
+        return {**head, **for_json(self.metrics), "aligned": aligned}
+
+
+def score_pair(
+    truth: str | Path,
+    estimate: str | Path,
+    *,
+    mode: str = "causal",
+    alignment: str = "none",
+    hz: float = RATE_HZ,
+    max_age_s: float = MAX_AGE_S,
+    gap_s: float = GAP_S,
+) -> PairScore:
+    """Score the track in ``estimate`` against ``truth``: TUM, CSV or MCAP files (`benchmarks.tracks`).
+
+    ``causal``: at each instant of the truth counts the newest answer, not older than ``max_age_s``. ``interp``: the
+    truth is interpolated at the stamps of the estimate. Raises `LogError` and `ParameterError`.
+    """
+    for given, known in ((mode, MODES), (alignment, ("none", *ALIGNMENTS))):
+        if given not in known:
+            raise ParameterError(f"{given!r} does not exist; {did_you_mean(given, known)}")
+    true, said = read_truth(truth), read_track(estimate)
+    weight, availability = None, {}
+    if mode == "interp":
+        instants, answers, weight, share = meet(true, said, gap_s=gap_s)
+        availability = {"availability": share}
+    else:
+        instants = evaluation_instants(true, hz=hz, gap_s=gap_s)
+        answers = match_track(instants, said, max_age_s=max_age_s)
+    if not answers.valid.any():
+        raise LogError(f"{estimate}: no pose can be compared with {truth}; see that both have the same clock")
+    score = PairScore(str(truth), str(estimate), mode, alignment, {**_score(instants, answers, weight), **availability})
+    moved = None if alignment == "none" else align(instants, answers, alignment)
+    if moved is None:
+        return score
+    return score._replace(
+        aligned={**_score(instants, moved.answers, weight), **availability}, map_from_estimate=moved.map_from_estimate
+    )
+
+
+def _score(instants: Instants, answers: Answers, weight: Floats | None) -> dict[str, float]:
+    return metrics(errors(instants, answers, weight))
+
+
+def print_score(score: PairScore, file: IO[str] | None = None) -> None:
+    """As tables for people."""
+    from benchmarks.pair_table import sheets
+    from benchmarks.sheet import print_sheets
+
+    print_sheets(sheets(score), file)
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion bench score``."""
+    track = "a TUM file, a CSV (time_s,x_m,y_m,heading_rad) or an MCAP log"
+    parser.add_argument("--truth", required=True, metavar="FILE", help=track)
+    parser.add_argument("--estimate", required=True, metavar="FILE", help=f"{track}; run.mcap:ekf chooses a lane of it")
+    parser.add_argument("--mode", choices=MODES, default=MODES[0], help="causal, or truth interpolated at the estimate")
+    parser.add_argument("--align", choices=("none", *ALIGNMENTS), default="none", help="beside the raw score")
+    parser.add_argument("--json", type=Path, metavar="OUT", help="write everything as one record; - for stdout")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Score, print the tables, write the record."""
+    score = score_pair(arguments.truth, arguments.estimate, mode=arguments.mode, alignment=arguments.align)
+    if arguments.json != Path("-"):
+        print_score(score)
+    if arguments.json is not None:
+        _write(score.record(), arguments.json)
+    return 0
+
+
+def _write(record: Mapping[str, object], output: Path) -> None:
+    text = json.dumps(record, indent=1, allow_nan=False) + "\n"
+    if output == Path("-"):
+        sys.stdout.write(text)
+        return
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise FusionError(f"{output}: the score cannot be written ({error.strerror}); give another place") from error
