@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-from scipy.special import chdtrc
 
 from benchmarks.consistency import CHI_SQUARE_95
 from benchmarks.instants import Floats
@@ -44,6 +43,8 @@ def ljung_box(series: Iterable[Floats]) -> float:
 
     The statistics of several series, one per anchor, are added, and so are their degrees of freedom.
     """
+    from scipy.special import chdtrc
+
     statistic, degrees = 0.0, 0
     for values in series:
         count = len(values)

@@ -13,9 +13,9 @@ from typing import IO, NamedTuple
 import numpy as np
 
 from benchmarks.alignment import ALIGNMENTS, align
-from benchmarks.instants import GAP_S, MAX_AGE_S, RATE_HZ, Answers, Floats, Instants, evaluation_instants, match_track
+from benchmarks.instants import GAP_S, MAX_AGE_S, RATE_HZ, evaluation_instants, match_track
 from benchmarks.interpolation import meet
-from benchmarks.score import errors, for_json, metrics
+from benchmarks.score import absolute_metrics, errors, for_json, metrics
 from benchmarks.tracks import read_track, read_truth
 from fusion import FusionError, LogError, ParameterError, Pose
 from fusion.errors import did_you_mean
@@ -24,9 +24,10 @@ MODES = ("causal", "interp")
 
 
 class PairScore(NamedTuple):
-    """The score of one track: ``metrics`` raw, ``aligned`` after ``map_from_estimate`` moved the estimate.
+    """The score of one track: ``metrics`` raw; those of position and heading ``aligned``, after ``map_from_estimate``
+    moved the estimate.
 
-    Both are None without alignment; where one was asked for and is impossible, ``align`` says so all the same.
+    The latter are None without alignment; where one was asked for and is impossible, ``align`` says so all the same.
     """
 
     truth: str
@@ -82,17 +83,13 @@ def score_pair(
         answers = match_track(instants, said, max_age_s=max_age_s)
     if not answers.valid.any():
         raise LogError(f"{estimate}: no pose can be compared with {truth}; see that both have the same clock")
-    score = PairScore(str(truth), str(estimate), mode, alignment, {**_score(instants, answers, weight), **availability})
+    raw = {**metrics(errors(instants, answers, weight)), **availability}
+    score = PairScore(str(truth), str(estimate), mode, alignment, raw)
     moved = None if alignment == "none" else align(instants, answers, alignment)
     if moved is None:
         return score
-    return score._replace(
-        aligned={**_score(instants, moved.answers, weight), **availability}, map_from_estimate=moved.map_from_estimate
-    )
-
-
-def _score(instants: Instants, answers: Answers, weight: Floats | None) -> dict[str, float]:
-    return metrics(errors(instants, answers, weight))
+    aligned = {**absolute_metrics(errors(instants, moved.answers, weight)), **availability}
+    return score._replace(aligned=aligned, map_from_estimate=moved.map_from_estimate)
 
 
 def print_score(score: PairScore, file: IO[str] | None = None) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.deviation import Errors
 from benchmarks.instants import Floats
-from benchmarks.quantiles import mean, quantile, quantiles, root_mean_square
+from benchmarks.quantiles import Ordered, mean, quantile, root_mean_square
 from benchmarks.samples import effective_sizes, order_shares
 
 AUC_RADIUS_M = 3.0
@@ -28,7 +28,8 @@ def position_metrics(measured: Errors) -> dict[str, float]:
     weight, position = measured.weights, measured.position
     valid, own = _finite(position, weight)
     centre = mean(valid, own)
-    found = quantiles(position, list(POSITION_QUANTILES.values()), weight)
+    ordered = Ordered.of(position, weight)
+    found = {name: ordered.quantile(share) for name, share in POSITION_QUANTILES.items()}
     return {
         "n": float(len(position)),
         "n_valid": float(len(valid)),
@@ -39,23 +40,25 @@ def position_metrics(measured: Errors) -> dict[str, float]:
         "pos_min": float(valid.min()) if len(valid) else math.nan,
         "pos_max": float(valid.max()) if len(valid) else math.nan,
         "pos_auc": mean(np.maximum(0.0, 1.0 - position / AUC_RADIUS_M), weight),
-        **dict(zip(POSITION_QUANTILES, found, strict=True)),
-        **_quantile_intervals(measured, found),
+        **found,
+        **_quantile_intervals(measured, ordered, found),
     }
 
 
-def _quantile_intervals(measured: Errors, found: list[float]) -> dict[str, float]:
+def _quantile_intervals(measured: Errors, ordered: Ordered, found: dict[str, float]) -> dict[str, float]:
     """``pos_p75_low`` and so on: 95 % intervals of the quantiles by binomial order statistics.
 
     ``n_eff`` is the effective sample size of the error, cut off at 3 m; each quantile's is that of being below it.
     """
     position = measured.position
-    below = [position <= min(value, GREATEST) for value in found]
+    below = [position <= min(value, GREATEST) for value in found.values()]
     sizes = effective_sizes(np.array([np.minimum(position, AUC_RADIUS_M), *below]), measured.run)
     own, *others = sizes.tolist()
-    shares = [end for pair in zip(POSITION_QUANTILES.values(), others, strict=True) for end in order_shares(*pair)]
-    names = [f"{name}_{end}" for name in POSITION_QUANTILES for end in ("low", "high")]
-    return {"n_eff": own, **dict(zip(names, quantiles(position, shares, measured.weights), strict=True))}
+    scores = {"n_eff": own}
+    for (name, share), samples in zip(POSITION_QUANTILES.items(), others, strict=True):
+        low, high = order_shares(share, samples)
+        scores |= {f"{name}_low": ordered.quantile(low), f"{name}_high": ordered.quantile(high)}
+    return scores
 
 
 def axis_metrics(measured: Errors) -> dict[str, float]:

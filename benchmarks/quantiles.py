@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,32 +33,38 @@ def quantile(values: Floats, share: float, weight: Floats | None = None) -> floa
 
     ``numpy.percentile`` answers NaN for the median of (1, 2, inf), for it computes 0 * inf.
     """
-    return quantiles(values, [share], weight)[0]
+    return Ordered.of(values, weight).quantile(share)
 
 
-def quantiles(values: Floats, shares: Sequence[float], weight: Floats | None = None) -> list[float]:
-    """Several quantiles of the same values.
-
-    With weights, the ordered value k stands at the share S_k / S_n with S_k the sum of (w_i + w_(i+1)) / 2 over i < k,
-    which for equal weights is the (k - 1) / (n - 1) of type 7.
+class Ordered(NamedTuple):
+    """Values in order, (n,), for several quantiles. With weights, ``stands`` (n,) says at what part of the way from
+    the first to the last each one stands.
     """
-    if len(values) == 0:
-        return [math.nan] * len(shares)
-    if weight is None:
-        ordered = np.sort(values)
-        places = [(len(ordered) - 1) * share for share in shares]
-    else:
+
+    values: Floats
+    stands: Floats | None
+
+    @classmethod
+    def of(cls, values: Floats, weight: Floats | None = None) -> Ordered:
+        """With weights, value k stands at S_k / S_n with S_k the sum of (w_i + w_(i+1)) / 2 over i < k: for equal
+        weights the (k - 1) / (n - 1) of type 7.
+        """
+        if weight is None or len(values) < 2:
+            return cls(np.sort(values), None)
         order = np.argsort(values, kind="stable")
-        ordered, sizes = values[order], weight[order]
-        stands = np.concatenate([[0.0], np.cumsum(0.5 * (sizes[1:] + sizes[:-1]))])
-        places = np.interp([share * stands[-1] for share in shares], stands, np.arange(len(stands))).tolist()
-    return [_between(ordered, place) for place in places]
+        sizes = weight[order]
+        sums = np.concatenate([[0.0], np.cumsum(0.5 * (sizes[1:] + sizes[:-1]))])
+        return cls(values[order], sums / sums[-1])
 
-
-def _between(ordered: Floats, place: float) -> float:
-    below = math.floor(place)
-    part = place - below
-    low, high = float(ordered[below]), float(ordered[min(below + 1, len(ordered) - 1)])
-    if part == 0.0 or math.isinf(low):
-        return low
-    return math.inf if math.isinf(high) else low + part * (high - low)
+    def quantile(self, share: float) -> float:
+        """The value below which that share lies."""
+        count = len(self.values)
+        if count == 0:
+            return math.nan
+        place = (count - 1) * share if self.stands is None else float(np.interp(share, self.stands, np.arange(count)))
+        below = int(place)
+        part = place - below
+        low, high = self.values[below].item(), self.values[min(below + 1, count - 1)].item()
+        if part == 0.0 or low == math.inf:
+            return float(low)
+        return math.inf if high == math.inf else float(low + part * (high - low))

@@ -18,21 +18,28 @@ from benchmarks.position import axis_metrics, heading_metrics, position_metrics,
 from benchmarks.quantiles import quantile
 from benchmarks.trajectory import trajectory_metrics
 
-__all__ = ["CHI_SQUARE_95", "Errors", "errors", "for_json", "metrics", "pool", "quantile"]
+__all__ = ["CHI_SQUARE_95", "Errors", "absolute_metrics", "errors", "for_json", "metrics", "pool", "quantile"]
 
 
 def metrics(measured: Errors) -> dict[str, float]:
     """All metrics by id, in m and rad; shares in [0, 1]. NaN where nothing can be said, infinite where most is lost."""
     return {
-        **position_metrics(measured),
-        **axis_metrics(measured),
-        **track_metrics(measured),
-        **heading_metrics(measured),
+        **absolute_metrics(measured),
         **trajectory_metrics(measured),
         **drift_metrics(measured),
         **consistency_metrics(measured),
         **distribution_metrics(measured),
         **dynamic_metrics(measured),
+    }
+
+
+def absolute_metrics(measured: Errors) -> dict[str, float]:
+    """Those of position and heading alone, which are all that alignment changes."""
+    return {
+        **position_metrics(measured),
+        **axis_metrics(measured),
+        **track_metrics(measured),
+        **heading_metrics(measured),
     }
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from benchmarks.instants import Track
 from benchmarks.interpolation import meet
-from benchmarks.quantiles import mean, quantile, quantiles
+from benchmarks.quantiles import Ordered, mean, quantile
 from benchmarks.score import errors, metrics
 from logs.run import TruthTrack
 
@@ -75,7 +75,7 @@ def test_equal_weights_change_nothing(values, share, weight):
 
 def test_weighted_quantile_stays_between_its_neighbours_and_meets_infinity():
     values, weights = np.array([1.0, 2.0, 3.0, np.inf]), np.array([1.0, 1.0, 6.0, 1.0])
-    found = quantiles(values, [0.0, 0.5, 0.6, 1.0], weights)
+    found = [Ordered.of(values, weights).quantile(share) for share in (0.0, 0.5, 0.6, 1.0)]
     assert found[0] == 1.0
     assert 2.0 < found[1] < 3.0
     assert found[2:] == [np.inf, np.inf]
