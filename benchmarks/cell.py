@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import platform
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -21,7 +20,7 @@ from benchmarks.innovations import innovation_metrics
 from benchmarks.instants import evaluation_instants, match
 from benchmarks.lane import Lane, run_lane
 from benchmarks.score import Errors, errors, for_json, metrics, quantile
-from fusion import Decision, Estimate
+from benchmarks.track import Track
 from logs.reader import read_run
 from logs.run import Run
 
@@ -103,25 +102,26 @@ def _errors(run: Run, lane: Lane) -> Errors | None:
     instants = evaluation_instants(run.truth)
     if len(instants.time_ns) == 0:
         return None
-    return errors(instants, match(instants, () if lane.error else lane.updates))
+    return errors(instants, match(instants, lane.track))
 
 
 def _status(lane: Lane, measured: Errors | None) -> str:
     if lane.error is not None:
         return "crashed"
-    if not all(_is_sound(update.estimate) for update in lane.updates):
-        return "diverged"
     if measured is None:
-        return "unscored"
+        return status_of(lane.track, math.nan, math.nan)
     available = float(np.isfinite(measured.position).mean())
+    return status_of(lane.track, available, quantile(measured.position, 0.5))
+
+
+def status_of(track: Track, availability: float, median_m: float) -> str:
+    """How a lane that was not lost ended, from its availability and its median position error; NaN without truth."""
+    if not track.is_sound:
+        return "diverged"
+    if math.isnan(availability):
+        return "unscored"
     # Fewer than half of the answers valid is also what makes the median infinite.
-    return "diverged" if available < LEAST_AVAILABILITY or not math.isfinite(quantile(measured.position, 0.5)) else "ok"
-
-
-def _is_sound(estimate: Estimate) -> bool:
-    """What an estimator does not claim, a position not valid or a heading not known, may be any number."""
-    x, y, heading = map(math.isfinite, estimate.pose)
-    return not estimate.valid or (x and y and (heading or not estimate.heading_known))
+    return "diverged" if availability < LEAST_AVAILABILITY or not math.isfinite(median_m) else "ok"
 
 
 def _facts(cell: Cell, run: Run) -> dict[str, object]:
@@ -141,14 +141,11 @@ def _cost(run: Run, lane: Lane) -> dict[str, object]:
     """What needs no truth: digest, processor time, and of the last word on each measurement fates and innovations."""
     if lane.error is not None:
         return {}
-    fates = [fate for update in lane.final for fate in update.fates]
-    decisions = Counter(fate.decision for fate in fates)
-    nis = [fate.nis for fate in fates if fate.nis is not None]
     return {
         "digest": lane.digest,
         "cpu_s": lane.cpu_s,
         "cpu_per_measurement_s": lane.cpu_s / len(run.measurements) if run.measurements else None,
-        "fates": {decision.value: decisions[decision] for decision in Decision},
-        "nis_mean": float(np.mean(nis)) if nis and np.isfinite(nis).all() else None,
-        **for_json(innovation_metrics(lane.final)),
+        "fates": lane.fates.counts,
+        "nis_mean": lane.fates.nis_mean,
+        **for_json(innovation_metrics(lane.fates)),
     }

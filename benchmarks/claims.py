@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.instants import Flags, Floats
+from benchmarks.track import Flags, Floats
 
 DIRECTIONS = 8
-"""Of the energy score: a mean over instants is then right to 0.03 %, of hopeless claims to 0.6 %."""
+"""Of the energy score: a mean over instants is then right to 0.2 %, of hopeless claims to 0.6 %."""
 LOG_TAU = float(np.log(2.0 * np.pi))
 
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from benchmarks.deviation import Errors
-from benchmarks.instants import Flags, Floats, Whole
 from benchmarks.quantiles import mean
 from benchmarks.samples import binomial_interval, effective_sizes, mean_chi_square_band
+from benchmarks.track import Flags, Floats, Whole
 
 CHI_SQUARE_95 = {1: 3.841458820694124, 2: 5.991464547107979, 3: 7.814727903251179}
 """Values a chi-square variable of 1, 2 and 3 degrees of freedom exceeds once in twenty."""

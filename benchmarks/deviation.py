@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.claims import judge
-from benchmarks.instants import Answers, Floats, Instants, Whole, wrap_angles
+from benchmarks.instants import Answers, Instants, wrap_angles
+from benchmarks.track import Floats, Whole
 
 
 class Errors(NamedTuple):

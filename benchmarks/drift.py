@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from benchmarks.deviation import Errors
-from benchmarks.instants import Floats, Whole
 from benchmarks.quantiles import quantile
+from benchmarks.track import Floats, Whole
 
 MOST_PAIRS = 3000
 """Slopes that a median is taken of. Of more pairs than these every k-th is used: the median then strays a tenth more

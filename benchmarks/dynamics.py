@@ -12,8 +12,8 @@ import numpy as np
 
 from benchmarks.deviation import Errors
 from benchmarks.drift import theil_sen
-from benchmarks.instants import Flags, Whole
 from benchmarks.quantiles import quantile
+from benchmarks.track import Flags, Whole
 from fusion.values import NANOSECONDS, nanoseconds
 
 CONVERGED_M, CONVERGED_S = 1.0, 5.0

@@ -8,33 +8,30 @@ from collections.abc import Iterable
 import numpy as np
 
 from benchmarks.consistency import CHI_SQUARE_95
-from benchmarks.instants import Floats
 from benchmarks.quantiles import mean
-from fusion import Gyro, Measurement, Ranges, Update, WheelTicks, WifiScan
+from benchmarks.track import FateColumns, Floats
 
-KINDS: dict[type[Measurement], str] = {WifiScan: "wifi", Ranges: "ranges", Gyro: "gyro", WheelTicks: "ticks"}
+NAMES = ("wifi", "ranges", "gyro", "ticks", "command", "odom")
+"""Of `benchmarks.track.KINDS`."""
 LAGS = 10
 """Of the Ljung-Box test; a series of fewer than five times as many values is tested up to a fifth of its length."""
 
 
-def innovation_metrics(updates: Iterable[Update]) -> dict[str, float]:
-    """Of the last word on each measurement, in time order, per kind of sensor: ``nis95_wifi``, the share of readings
-    inside the 95 % of their own variance, and ``white_wifi``, the p-value of their whiteness (small: not white).
+def innovation_metrics(fates: FateColumns) -> dict[str, float]:
+    """Per kind of sensor: ``nis95_wifi``, the share of readings inside the 95 % of their own variance, and
+    ``white_wifi``, the p-value of their whiteness (small: not white).
 
     Refused readings count: a gate would else make every filter look honest.
     """
-    by_kind: dict[str, dict[str, list[tuple[float, float]]]] = {}
-    for update in updates:
-        kind = KINDS.get(type(update.measurement))
-        for fate in update.fates:
-            if kind and fate.nis is not None and fate.innovation is not None and fate.innovation_variance:
-                scaled = fate.innovation / math.sqrt(fate.innovation_variance)
-                by_kind.setdefault(kind, {}).setdefault(fate.anchor, []).append((fate.nis, scaled))
+    known = np.isfinite(fates.nis) & np.isfinite(fates.innovation) & (fates.innovation_variance > 0.0)
+    scaled = fates.innovation / np.sqrt(np.where(known, fates.innovation_variance, 1.0))
     scores = {}
-    for kind, by_anchor in sorted(by_kind.items()):
-        series = [np.array(rows) for rows in by_anchor.values()]
-        scores[f"nis95_{kind}"] = mean(np.concatenate(series)[:, 0] <= CHI_SQUARE_95[1])
-        scores[f"white_{kind}"] = ljung_box([rows[:, 1] for rows in series])
+    for kind, name in sorted(enumerate(NAMES), key=lambda item: item[1]):
+        own = known & (fates.kind == kind)
+        if own.any():
+            series = [scaled[own & (fates.anchor == anchor)] for anchor in np.unique(fates.anchor[own])]
+            scores[f"nis95_{name}"] = mean(fates.nis[own] <= CHI_SQUARE_95[1])
+            scores[f"white_{name}"] = ljung_box(series)
     return scores
 
 

@@ -7,13 +7,11 @@ held constant, and one that is too old counts as none at all.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fusion import Decision, Estimate, Ranges, Reason, Update, WifiScan
+from benchmarks.track import BEFORE_ALL_NS, Flags, Floats, Track, Whole
 from fusion.values import NANOSECONDS, nanoseconds
 from logs.run import TruthTrack
 
@@ -23,14 +21,6 @@ GAP_S = 0.5
 """Across a longer gap the truth is not interpolated."""
 MAX_AGE_S = 1.0
 """An older estimate counts as none."""
-BEFORE_ALL_NS = np.iinfo(np.int64).min
-SYMMETRIC = [0, 1, 2, 1, 3, 4, 2, 4, 5]
-"""Where the nine numbers of a covariance stand among the six of `fusion.Covariance`."""
-NO_CLAIM = (np.nan,) * 6
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 
 class Instants(NamedTuple):
@@ -46,26 +36,9 @@ class Instants(NamedTuple):
         return Instants(self.time_ns[rows], self.x[rows], self.y[rows], self.heading[rows])
 
 
-class Track(NamedTuple):
-    """What an estimator said, in the order it was heard, all (m,): stamp [ns], whether it claims to be valid and is
-    finite, x, y [m], heading [rad], NaN where not known; ``covariance`` (m, 3, 3), NaN where none was claimed.
-    """
-
-    time_ns: Whole
-    valid: Flags
-    x: Floats
-    y: Floats
-    heading: Floats
-    covariance: Floats
-
-    def at(self, rows: Whole) -> Track:
-        """Some of it, by index."""
-        pose = self.x[rows], self.y[rows], self.heading[rows]
-        return Track(self.time_ns[rows], self.valid[rows], *pose, self.covariance[rows])
-
-
 class Answers(NamedTuple):
-    """What counts at each instant: as in `Track`, (n,). ``valid`` is False, too, for what is too old.
+    """What counts at each instant, all (n,): x, y [m], heading [rad], NaN where not known; ``covariance`` (n, 3, 3),
+    NaN where none was claimed. ``valid`` is False, too, for what is too old.
 
     ``age_s`` is the instant minus the stamp of the newest answer, infinite before the first; ``since_fix_s`` the time
     since the last radio measurement that was used, NaN before the first, or where nothing says what was used.
@@ -129,37 +102,14 @@ def interpolate_truth(known: Instants, time_ns: Whole, *, gap_s: float) -> tuple
     return resampled, (span_ns <= nanoseconds(gap_s)) | (share == 0.0) | (share == 1.0)
 
 
-def reception_ns(updates: Sequence[Update]) -> Whole:
-    """When each update was there, (m,): the newest stamp among the messages received by then.
-
-    Updates stand in the order of arrival, so this never decreases. A message whose own clock was refused says
-    nothing about the time.
-    """
-    clocks = [BEFORE_ALL_NS if _is_bad_clock(update) else update.measurement.time_ns for update in updates]
-    return np.maximum.accumulate(np.array(clocks, dtype=np.int64))
-
-
-def _is_bad_clock(update: Update) -> bool:
-    return bool(update.fates) and update.fates[0].reason is Reason.BAD_CLOCK
-
-
-def match(instants: Instants, updates: Sequence[Update], *, max_age_s: float = MAX_AGE_S) -> Answers:
+def match(instants: Instants, track: Track, *, max_age_s: float = MAX_AGE_S) -> Answers:
     """For each instant the newest estimate received by then; of two with one stamp, the later received.
 
     Valid when the estimator says so, its position is finite and ``instant - stamp <= max_age_s`` in whole nanoseconds.
     """
-    received_ns = reception_ns(updates)
-    stamp_ns = np.array([update.estimate.time_ns for update in updates], dtype=np.int64)
-    chosen, heard = _newest(instants, stamp_ns, received_ns)
-    said = track_of([updates[i].estimate for i in chosen])
-    fixes_ns = np.array([update.measurement.time_ns if _is_fix(update) else BEFORE_ALL_NS for update in updates])
-    return _answers(instants, said, heard, _since_fix_s(instants, received_ns, fixes_ns), max_age_s)
-
-
-def match_track(instants: Instants, track: Track, *, max_age_s: float = MAX_AGE_S) -> Answers:
-    """The same of a track alone: each answer was there as soon as the newest stamp before it in the track."""
-    chosen, heard = _newest(instants, track.time_ns, np.maximum.accumulate(track.time_ns))
-    return _answers(instants, track.at(chosen), heard, np.full(len(heard), np.nan), max_age_s)
+    chosen, heard = _newest(instants, track.time_ns, track.received_ns)
+    since_fix_s = _since_fix_s(instants, track.received_ns, track.fix_ns)
+    return _answers(instants, track.at(chosen), heard, since_fix_s, max_age_s)
 
 
 def _newest(instants: Instants, stamp_ns: Whole, received_ns: Whole) -> tuple[Whole, Flags]:
@@ -169,13 +119,6 @@ def _newest(instants: Instants, stamp_ns: Whole, received_ns: Whole) -> tuple[Wh
     received = np.searchsorted(received_ns, instants.time_ns, side="right") - 1
     heard = received >= 0
     return newest[np.maximum(received, 0)] if len(newest) else newest, heard
-
-
-def _is_fix(update: Update) -> bool:
-    """Whether a radio measurement, which alone knows where the robot is, was believed, at least in part."""
-    if not isinstance(update.measurement, WifiScan | Ranges):
-        return False
-    return any(fate.decision in (Decision.USED, Decision.DOWNWEIGHTED) and fate.weight > 0.0 for fate in update.fates)
 
 
 def _since_fix_s(instants: Instants, received_ns: Whole, fixes_ns: Whole) -> Floats:
@@ -188,28 +131,13 @@ def _since_fix_s(instants: Instants, received_ns: Whole, fixes_ns: Whole) -> Flo
     return since
 
 
-def track_of(estimates: Sequence[Estimate]) -> Track:
-    """Estimates as columns."""
-    pose = np.array([estimate.pose for estimate in estimates], dtype=np.float64).reshape(-1, 3)
-    covariance = [NO_CLAIM if e.covariance is None else e.covariance for e in estimates]
-    claimed = np.array([estimate.valid for estimate in estimates], dtype=bool)
-    heading_known = np.array([estimate.heading_known for estimate in estimates], dtype=bool)
-    return Track(
-        np.array([estimate.time_ns for estimate in estimates], dtype=np.int64),
-        claimed & np.isfinite(pose[:, 0]) & np.isfinite(pose[:, 1]),
-        pose[:, 0],
-        pose[:, 1],
-        np.where(heading_known & np.isfinite(pose[:, 2]), pose[:, 2], np.nan),
-        np.array(covariance, dtype=np.float64).reshape(-1, 6)[:, SYMMETRIC].reshape(-1, 3, 3),
-    )
-
-
 def _answers(instants: Instants, said: Track, heard: Flags, since_fix_s: Floats, max_age_s: float) -> Answers:
     if len(said.time_ns) == 0:
         unknown = np.full(len(heard), np.nan)
         nothing = np.full((len(heard), 3, 3), np.nan)
         return Answers(heard & False, unknown, unknown, unknown, nothing, np.full(len(heard), np.inf), unknown)
     age_ns = instants.time_ns - said.time_ns
-    valid = heard & (age_ns <= nanoseconds(max_age_s)) & said.valid
+    valid = heard & (age_ns <= nanoseconds(max_age_s)) & said.usable
     age_s = np.where(heard, age_ns / NANOSECONDS, np.inf)
-    return Answers(valid, said.x, said.y, said.heading, said.covariance, age_s, since_fix_s)
+    x, y, _ = said.pose.T
+    return Answers(valid, x, y, said.heading, said.covariance_matrices, age_s, since_fix_s)

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.instants import GAP_S, Answers, Floats, Instants, Track, Whole, interpolate_truth, known_truth
+from benchmarks.instants import GAP_S, Answers, Instants, interpolate_truth, known_truth
+from benchmarks.track import Floats, Track, Whole
 from fusion.values import NANOSECONDS, nanoseconds
 from logs.run import TruthTrack
 
@@ -37,10 +38,11 @@ def meet(truth: TruthTrack, track: Track, *, gap_s: float = GAP_S) -> Met:
     rows = _chosen(track, known)
     instants, kept = interpolate_truth(known, track.time_ns[rows], gap_s=gap_s)
     said, instants = track.at(rows[kept]), instants.at(kept)
-    now, unknown = np.zeros(len(said.x)), np.full(len(said.x), np.nan)
+    x, y, _ = said.pose.T
+    now, unknown = np.zeros(len(x)), np.full(len(x), np.nan)
     steps_s = np.minimum(np.diff(instants.time_ns), nanoseconds(gap_s)) / NANOSECONDS
     weight = 0.5 * (np.append(steps_s, 0.0) + np.insert(steps_s, 0, 0.0)) if len(now) else now
-    answers = Answers(said.valid, said.x, said.y, said.heading, said.covariance, now, unknown)
+    answers = Answers(said.usable, x, y, said.heading, said.covariance_matrices, now, unknown)
     gaps_ns = np.diff(known.time_ns)
     watched_s = float(gaps_ns[gaps_ns <= nanoseconds(gap_s)].sum()) / NANOSECONDS
     return Met(instants, answers, weight, min(float(weight.sum()) / watched_s, 1.0) if watched_s else np.nan)
@@ -50,7 +52,7 @@ def _chosen(track: Track, known: Instants) -> Whole:
     """Rows of ``track`` in order of time, each stamp once, within the truth."""
     if len(known.time_ns) < 2:
         return np.empty(0, dtype=np.int64)
-    inside = (track.time_ns >= known.time_ns[0]) & (track.time_ns <= known.time_ns[-1]) & track.valid
+    inside = (track.time_ns >= known.time_ns[0]) & (track.time_ns <= known.time_ns[-1]) & track.usable
     rows = np.flatnonzero(inside)[::-1]
     _, last = np.unique(track.time_ns[rows], return_index=True)
     return rows[last]

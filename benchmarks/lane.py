@@ -43,7 +43,7 @@ class Lane:
     @cached_property
     def fates(self) -> FateColumns:
         """The last word on every reading, as columns."""
-        return FateColumns.of([fate for update in self.final for fate in update.fates])
+        return FateColumns.of(self.final)
 
 
 def run_lane(run: Run, estimator: str, options: Mapping[str, object] | None = None, seed: int = 0) -> Lane:

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
-import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, NamedTuple
 
 import numpy as np
 
 from benchmarks.alignment import ALIGNMENTS, align
-from benchmarks.instants import GAP_S, MAX_AGE_S, RATE_HZ, evaluation_instants, match_track
+from benchmarks.instants import GAP_S, MAX_AGE_S, RATE_HZ, evaluation_instants, match
 from benchmarks.interpolation import meet
+from benchmarks.output import write_json
 from benchmarks.score import absolute_metrics, errors, for_json, metrics
 from benchmarks.tracks import read_track, read_truth
-from fusion import FusionError, LogError, ParameterError, Pose
+from fusion import LogError, ParameterError, Pose
 from fusion.errors import did_you_mean
 
 MODES = ("causal", "interp")
@@ -80,7 +78,7 @@ def score_pair(
         availability = {"availability": share}
     else:
         instants = evaluation_instants(true, hz=hz, gap_s=gap_s)
-        answers = match_track(instants, said, max_age_s=max_age_s)
+        answers = match(instants, said, max_age_s=max_age_s)
     if not answers.valid.any():
         raise LogError(f"{estimate}: no pose can be compared with {truth}; see that both have the same clock")
     raw = {**metrics(errors(instants, answers, weight)), **availability}
@@ -116,17 +114,5 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json != Path("-"):
         print_score(score)
     if arguments.json is not None:
-        _write(score.record(), arguments.json)
+        write_json(arguments.json, score.record(), indent=1)
     return 0
-
-
-def _write(record: Mapping[str, object], output: Path) -> None:
-    text = json.dumps(record, indent=1, allow_nan=False) + "\n"
-    if output == Path("-"):
-        sys.stdout.write(text)
-        return
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        output.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FusionError(f"{output}: the score cannot be written ({error.strerror}); give another place") from error

@@ -11,9 +11,9 @@ import math
 import numpy as np
 
 from benchmarks.deviation import Errors
-from benchmarks.instants import Floats
 from benchmarks.quantiles import Ordered, mean, quantile, root_mean_square
 from benchmarks.samples import effective_sizes, order_shares
+from benchmarks.track import Floats
 
 AUC_RADIUS_M = 3.0
 POSITION_QUANTILES = {"pos_p50": 0.50, "pos_p75": 0.75, "pos_p90": 0.90, "pos_p95": 0.95, "pos_p99": 0.99}

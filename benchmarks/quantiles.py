@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.instants import Floats
+from benchmarks.track import Floats
 
 
 def mean(values: Floats | NDArray[np.bool_], weight: Floats | None = None) -> float:

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from benchmarks.instants import Floats, Whole
+from benchmarks.track import Floats, Whole
 
 TAIL = 0.025
 """Probability left out on either side: intervals hold with 95 %."""

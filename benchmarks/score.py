@@ -18,7 +18,20 @@ from benchmarks.position import axis_metrics, heading_metrics, position_metrics,
 from benchmarks.quantiles import quantile
 from benchmarks.trajectory import trajectory_metrics
 
-__all__ = ["CHI_SQUARE_95", "Errors", "absolute_metrics", "errors", "for_json", "metrics", "pool", "quantile"]
+METRICS_VERSION = 2
+"""Changes whenever a metric does, so that stored scores are not taken for current ones."""
+
+__all__ = [
+    "CHI_SQUARE_95",
+    "METRICS_VERSION",
+    "Errors",
+    "absolute_metrics",
+    "errors",
+    "for_json",
+    "metrics",
+    "pool",
+    "quantile",
+]
 
 
 def metrics(measured: Errors) -> dict[str, float]:

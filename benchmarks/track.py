@@ -12,48 +12,96 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fusion import Decision, Fate, Reason, Update
+from fusion import Decision, Estimate, Gyro, MotorCommand, Odometry, Ranges, Reason, Update, WheelTicks, WifiScan
 
 Floats = NDArray[np.float64]
-Stamps = NDArray[np.int64]
+Whole = NDArray[np.int64]
+Stamps = Whole
 Flags = NDArray[np.bool_]
 Codes = NDArray[np.int16]
 
 DECISIONS, REASONS = tuple(Decision), tuple(Reason)
-_NONE = (np.nan,) * 6
-_BEFORE_ALL = np.iinfo(np.int64).min
+KINDS = (WifiScan, Ranges, Gyro, WheelTicks, MotorCommand, Odometry)
+BEFORE_ALL_NS = np.iinfo(np.int64).min
+NO_CLAIM = (np.nan,) * 6
+BELIEVED = (Decision.USED, Decision.DOWNWEIGHTED)
 
 
 class Track(NamedTuple):
-    """Estimates in the order they were made, n rows.
+    """Estimates in the order they were heard, n rows.
 
     ``received_ns``: when each was there, the newest stamp among the messages received by then, so it never decreases;
-    a message whose own clock was refused says nothing about the time. ``stamp_ns``: the time it is about. ``pose``
+    a message whose own clock was refused says nothing about the time. ``time_ns``: the time it is about. ``pose``
     (n, 3) [m, m, rad]. ``covariance`` (n, 6), in the order of `fusion.Covariance`, NaN where none was claimed.
+    ``fix_ns``: the stamp of the radio measurement that was believed just then, or `BEFORE_ALL_NS`.
     """
 
     received_ns: Stamps
-    stamp_ns: Stamps
+    time_ns: Stamps
     pose: Floats
     covariance: Floats
     valid: Flags
     heading_known: Flags
-    reset_count: NDArray[np.int64]
+    fix_ns: Stamps
 
     @classmethod
     def of(cls, updates: Sequence[Update]) -> Track:
         """The columns of all updates of one lane, revisions among them."""
-        estimates = [update.estimate for update in updates]
-        clocks = [_BEFORE_ALL if _is_bad_clock(update) else update.measurement.time_ns for update in updates]
+        clocks = [BEFORE_ALL_NS if _is_bad_clock(update) else update.measurement.time_ns for update in updates]
+        fixes = [update.measurement.time_ns if _is_fix(update) else BEFORE_ALL_NS for update in updates]
+        said = cls.of_estimates([update.estimate for update in updates])
+        received = np.maximum.accumulate(np.array(clocks, dtype=np.int64))
+        return said._replace(received_ns=received, fix_ns=np.array(fixes, dtype=np.int64))
+
+    @classmethod
+    def of_estimates(cls, estimates: Sequence[Estimate]) -> Track:
+        """Estimates alone: each was there as soon as the newest stamp before it, and nothing says what was believed."""
+        time_ns = np.array([estimate.time_ns for estimate in estimates], dtype=np.int64)
         return cls(
-            np.maximum.accumulate(np.array(clocks, dtype=np.int64)) if clocks else np.zeros(0, np.int64),
-            np.array([estimate.time_ns for estimate in estimates], dtype=np.int64),
+            np.maximum.accumulate(time_ns),
+            time_ns,
             np.array([estimate.pose for estimate in estimates], dtype=np.float64).reshape(-1, 3),
-            np.array([estimate.covariance or _NONE for estimate in estimates], dtype=np.float64).reshape(-1, 6),
+            np.array([estimate.covariance or NO_CLAIM for estimate in estimates], dtype=np.float64).reshape(-1, 6),
             np.array([estimate.valid for estimate in estimates], dtype=bool),
             np.array([estimate.heading_known for estimate in estimates], dtype=bool),
-            np.array([estimate.reset_count for estimate in estimates], dtype=np.int64),
+            np.full(len(time_ns), BEFORE_ALL_NS),
         )
+
+    @classmethod
+    def of_poses(cls, time_ns: Stamps, x: Floats, y: Floats, heading: Floats) -> Track:
+        """Poses alone, all (n,): valid, without a covariance; a heading of NaN is not known."""
+        count = len(time_ns)
+        return cls(
+            np.maximum.accumulate(time_ns),
+            time_ns,
+            np.stack([x, y, heading], axis=1),
+            np.full((count, 6), np.nan),
+            np.ones(count, dtype=bool),
+            np.isfinite(heading),
+            np.full(count, BEFORE_ALL_NS),
+        )
+
+    def at(self, rows: Whole) -> Track:
+        """Some of it, by index."""
+        return Track(
+            self.received_ns[rows],
+            self.time_ns[rows],
+            self.pose[rows],
+            self.covariance[rows],
+            self.valid[rows],
+            self.heading_known[rows],
+            self.fix_ns[rows],
+        )
+
+    @property
+    def usable(self) -> Flags:
+        """Whether each claims to be valid, and is a position."""
+        return self.valid & np.isfinite(self.pose[:, 0]) & np.isfinite(self.pose[:, 1])
+
+    @property
+    def heading(self) -> Floats:
+        """[rad], NaN where it is not known."""
+        return np.where(self.heading_known & np.isfinite(self.pose[:, 2]), self.pose[:, 2], np.nan)
 
     @property
     def covariance_matrices(self) -> Floats:
@@ -72,12 +120,21 @@ def _is_bad_clock(update: Update) -> bool:
     return bool(update.fates) and update.fates[0].reason is Reason.BAD_CLOCK
 
 
+def _is_fix(update: Update) -> bool:
+    """Whether a radio measurement, which alone knows where the robot is, was believed, at least in part."""
+    if not isinstance(update.measurement, WifiScan | Ranges):
+        return False
+    return any(fate.decision in BELIEVED and fate.weight > 0.0 for fate in update.fates)
+
+
 class FateColumns(NamedTuple):
-    """The last word on every reading, m rows. ``sensor`` and ``anchor`` count into ``names``; ``decision`` and
-    ``reason`` into `DECISIONS` and `REASONS`. Innovations are NaN where a method predicts none.
+    """The last word on every reading, m rows in time order. ``kind`` counts into `KINDS`, ``sensor`` and ``anchor``
+    into ``names``, ``decision`` and ``reason`` into `DECISIONS` and `REASONS`. Innovations are NaN where a method
+    predicts none.
     """
 
     time_ns: Stamps
+    kind: Codes
     sensor: Codes
     anchor: Codes
     decision: Codes
@@ -89,8 +146,10 @@ class FateColumns(NamedTuple):
     names: NDArray[np.str_]
 
     @classmethod
-    def of(cls, fates: Sequence[Fate]) -> FateColumns:
-        """The columns of fates in time order."""
+    def of(cls, updates: Sequence[Update]) -> FateColumns:
+        """The columns of the fates of updates in time order."""
+        fates = [fate for update in updates for fate in update.fates]
+        kinds = [KINDS.index(type(update.measurement)) for update in updates for _ in update.fates]
         names = sorted({name for fate in fates for name in (fate.sensor, fate.anchor)})
         place = {name: code for code, name in enumerate(names)}
         decisions, reasons = ({item: code for code, item in enumerate(items)} for items in (DECISIONS, REASONS))
@@ -98,6 +157,7 @@ class FateColumns(NamedTuple):
         weight, innovation, variance, nis = np.array(numbers, dtype=np.float64).reshape(-1, 4).T
         return cls(
             np.array([fate.time_ns for fate in fates], dtype=np.int64),
+            np.array(kinds, dtype=np.int16),
             np.array([place[fate.sensor] for fate in fates], dtype=np.int16),
             np.array([place[fate.anchor] for fate in fates], dtype=np.int16),
             np.array([decisions[fate.decision] for fate in fates], dtype=np.int16),

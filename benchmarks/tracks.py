@@ -10,7 +10,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.instants import Flags, Floats, Track, Whole, track_of
+from benchmarks.track import Flags, Floats, Track, Whole
 from fusion import FusionError, LogError
 from fusion.errors import did_you_mean
 from fusion.values import NANOSECONDS
@@ -46,8 +46,7 @@ def read_track(source: str | Path) -> Track:
         path, name = str(source), ""
     if path.endswith(".mcap"):
         return _read_lane(Path(path), name)
-    time_ns, x, y, heading = _read_text(Path(path))
-    return Track(time_ns, np.ones(len(x), dtype=bool), x, y, heading, np.full((len(x), 3, 3), np.nan))
+    return Track.of_poses(*_read_text(Path(path)))
 
 
 def _read_lane(path: Path, name: str) -> Track:
@@ -59,7 +58,7 @@ def _read_lane(path: Path, name: str) -> Track:
     chosen = name or next(iter(lanes))
     if chosen not in lanes:
         raise LogError(f"{path}: holds no estimates of {chosen!r}; {did_you_mean(chosen, lanes)}")
-    return track_of(lanes[chosen])
+    return Track.of_estimates(lanes[chosen])
 
 
 def _read_text(path: Path) -> tuple[Whole, Floats, Floats, Floats]:

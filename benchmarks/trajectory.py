@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.deviation import Errors
-from benchmarks.instants import Floats, Whole
 from benchmarks.quantiles import mean, quantile, root_mean_square
+from benchmarks.track import Floats, Whole
 from fusion.values import NANOSECONDS, nanoseconds
 
 DISTANCES_M = (1, 5, 10)

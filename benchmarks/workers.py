@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import Enum, unique
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from typing import Any, Generic, NamedTuple, NoReturn, TypeVar
 
 from fusion import FusionError
@@ -196,11 +197,17 @@ def _serve(connection: Connection, work: Callable[[Any], Any], rss_mb: float | N
 
 def _watch_memory(rss_mb: float) -> NoReturn:
     """End the process once it has ever held more than it may."""
-    import resource
-    import sys
-
-    unit = 1 if sys.platform == "darwin" else 1024
-    while True:
-        if resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit > rss_mb * 2**20:
-            os._exit(OUT_OF_MEMORY)
+    while _peak_rss_bytes() <= rss_mb * 2**20:
         time.sleep(WATCH_S)
+    os._exit(OUT_OF_MEMORY)
+
+
+def _peak_rss_bytes() -> int:
+    """The most memory that was ever resident. Linux's own resource usage would count what the parent held, too."""
+    try:
+        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+        return 1024 * int(next(line for line in lines if line.startswith("VmHWM")).split()[1])
+    except (OSError, StopIteration):
+        import resource
+
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -42,6 +42,7 @@ GROUPS = {
     "bench": {
         "plan": Verb("benchmarks.runner.plan_verb", "what a suite would compute, and what of it is there"),
         "run": Verb("benchmarks.runner.run_verb", "compute what is missing of a suite"),
+        "score": Verb("benchmarks.pair", "score one recorded track against another: TUM, CSV or MCAP files"),
         "time": Verb("benchmarks.runner.time_verb", "what each estimator costs, measured alone"),
         "report": Verb("benchmarks.report.verb", "the results as one HTML page"),
         "compare": Verb("benchmarks.runner.compare_verb", "which estimator is better, or that the runs cannot tell"),

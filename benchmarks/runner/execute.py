@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from benchmarks.cell import status_of
 from benchmarks.faults import apply_faults
+from benchmarks.innovations import innovation_metrics
 from benchmarks.instants import evaluation_instants, match
 from benchmarks.lane import Lane, run_lane
 from benchmarks.runner.definition import CLEAN, CellLimits
@@ -94,9 +95,11 @@ def score(cell: Cell, store: Store) -> str:
     """Judge the estimate in the store, unless that was done; answers the status."""
     if not store.has("scores", cell.score_key):
         made = store.read_json("estimates", cell.estimate_key, "result.json")
-        track, _ = from_bytes(store.read("estimates", cell.estimate_key, "track.npz"))
+        track, fates = from_bytes(store.read("estimates", cell.estimate_key, "track.npz"))
         measured = _metrics(cell, track)
-        status = made["ended"] if made["error"] else status_of(track, measured)
+        said = (measured.get("availability", math.nan), measured.get("pos_p50", math.nan))
+        status = made["ended"] if made["error"] else status_of(track, *said)
+        measured |= innovation_metrics(fates)
         found = {"status": status, "metrics": {key: _finite(value) for key, value in measured.items()}}
         store.write("scores", cell.score_key, {"result.json": to_json(found)})
     return str(store.read_json("scores", cell.score_key, "result.json")["status"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.innovations import innovation_metrics, ljung_box
+from benchmarks.track import FateColumns
 from fusion import Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, RssiReading, Update, WifiScan
 
 
@@ -24,25 +25,27 @@ def updates_of(kind, reading, innovations, variance=1.0):
 
 
 def test_honest_white_innovations_pass():
-    scores = innovation_metrics(updates_of(WifiScan, RssiReading, np.random.default_rng(1).normal(size=(500, 3))))
+    scores = innovation_metrics(
+        FateColumns.of(updates_of(WifiScan, RssiReading, np.random.default_rng(1).normal(size=(500, 3))))
+    )
     assert scores["nis95_wifi"] == pytest.approx(0.95, abs=0.02)
     assert scores["white_wifi"] > 0.05
 
 
 def test_innovations_twice_as_large_as_claimed_are_seen():
     drawn = 2.0 * np.random.default_rng(2).normal(size=(500, 1))
-    assert innovation_metrics(updates_of(Ranges, RangeReading, drawn))["nis95_ranges"] < 0.75
+    assert innovation_metrics(FateColumns.of(updates_of(Ranges, RangeReading, drawn)))["nis95_ranges"] < 0.75
 
 
 def test_slow_innovations_are_not_white():
     slow = np.cumsum(np.random.default_rng(3).normal(size=(300, 1)), axis=0)
-    assert innovation_metrics(updates_of(Ranges, RangeReading, slow, 100.0))["white_ranges"] < 1e-6
+    assert innovation_metrics(FateColumns.of(updates_of(Ranges, RangeReading, slow, 100.0)))["white_ranges"] < 1e-6
 
 
 def test_each_kind_of_sensor_is_judged_by_itself():
     drawn = np.random.default_rng(4).normal(size=(60, 2))
     both = updates_of(WifiScan, RssiReading, drawn) + updates_of(Ranges, RangeReading, drawn)
-    assert set(innovation_metrics(both)) == {"nis95_wifi", "white_wifi", "nis95_ranges", "white_ranges"}
+    assert set(innovation_metrics(FateColumns.of(both))) == {"nis95_wifi", "white_wifi", "nis95_ranges", "white_ranges"}
 
 
 def test_method_without_predictions_has_no_figure():
@@ -50,7 +53,7 @@ def test_method_without_predictions_has_no_figure():
     scan = WifiScan(0, "radio", 0, (RssiReading("ap0", -50.0),))
     still = Odometry(0, "wheels", 0, -1, 0.0, 0.0)
     estimate = Estimate(0, Pose(0.0, 0.0, 0.0), None)
-    assert innovation_metrics([Update(scan, estimate, (fate,)), Update(still, estimate, ())]) == {}
+    assert innovation_metrics(FateColumns.of([Update(scan, estimate, (fate,)), Update(still, estimate, ())])) == {}
 
 
 def test_ljung_box_of_one_lag_has_its_closed_form():

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.instants import evaluation_instants, match, match_track, reception_ns, track_of
+from benchmarks.instants import evaluation_instants, match
+from benchmarks.track import Track
 from fusion import Covariance, Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, Update
 from logs.run import TruthTrack
 
@@ -67,47 +68,47 @@ def test_truth_that_is_nowhere_finite_gives_no_instants():
 
 def test_an_answer_of_exactly_the_greatest_age_is_valid_and_a_nanosecond_more_is_not():
     instants = evaluation_instants(truth_at([SECOND, SECOND + 1]), hz=1e9)
-    assert match(instants, [update_at(0)]).valid.tolist() == [True, False]
+    assert match(instants, Track.of([update_at(0)])).valid.tolist() == [True, False]
 
 
 def test_no_answer_comes_from_the_future():
     instants = evaluation_instants(truth_at([0, SECOND]))
-    answers = match(instants, [update_at(1, 5.0), update_at(SECOND, 6.0), update_at(SECOND + 1, 7.0)])
+    answers = match(instants, Track.of([update_at(1, 5.0), update_at(SECOND, 6.0), update_at(SECOND + 1, 7.0)]))
     assert answers.valid.tolist() == [False, True]
     assert answers.x[1] == 6.0
 
 
 def test_an_answer_about_the_past_counts_only_once_it_was_received():
     instants = evaluation_instants(truth_at([SECOND, 2 * SECOND]))
-    answers = match(instants, [update_at(2 * SECOND, 5.0, stamp_ns=SECOND)])
+    answers = match(instants, Track.of([update_at(2 * SECOND, 5.0, stamp_ns=SECOND)]))
     assert answers.valid.tolist() == [False, True]
 
 
 def test_a_late_message_replaces_the_newest_answer_only_by_its_revision():
     instants = evaluation_instants(truth_at([10, 20]), hz=1e9)
     late = [update_at(10, 1.0), update_at(5, 2.0), update_at(10, 3.0)._replace(revised=True)]
-    assert match(instants, late).x.tolist() == [3.0, 3.0]
+    assert match(instants, Track.of(late)).x.tolist() == [3.0, 3.0]
 
 
 def test_a_refused_clock_does_not_move_the_time_of_reception():
     bad = Fate(SECOND * 10**6, "wheels", 0, "", Decision.UNUSABLE, Reason.BAD_CLOCK, 0.0)
     updates = [update_at(10), update_at(SECOND * 10**6, stamp_ns=10, fates=(bad,)), update_at(20)]
-    assert reception_ns(updates).tolist() == [10, 10, 20]
+    assert Track.of(updates).received_ns.tolist() == [10, 10, 20]
 
 
 def test_answers_not_claimed_or_not_finite_are_not_valid():
     instants = evaluation_instants(truth_at([10]))
-    assert not match(instants, [update_at(10, math.nan)]).valid[0]
-    assert not match(instants, [update_at(10, valid=False)]).valid[0]
-    assert not match(instants, []).valid[0]
-    assert math.isnan(match(instants, [update_at(10, heading_known=False)]).heading[0])
+    assert not match(instants, Track.of([update_at(10, math.nan)])).valid[0]
+    assert not match(instants, Track.of([update_at(10, valid=False)])).valid[0]
+    assert not match(instants, Track.of([])).valid[0]
+    assert math.isnan(match(instants, Track.of([update_at(10, heading_known=False)])).heading[0])
 
 
 def test_age_is_that_of_the_newest_answer_and_infinite_before_the_first():
     instants = evaluation_instants(truth_at([0, SECOND, 3 * SECOND]))
-    answers = match(instants, [update_at(SECOND // 2), update_at(SECOND, stamp_ns=3 * SECOND // 4)])
+    answers = match(instants, Track.of([update_at(SECOND // 2), update_at(SECOND, stamp_ns=3 * SECOND // 4)]))
     assert answers.age_s.tolist() == [math.inf, 0.25, 2.25]
-    assert match(instants, []).age_s.tolist() == [math.inf] * 3
+    assert match(instants, Track.of([])).age_s.tolist() == [math.inf] * 3
 
 
 def ranges_at(time_ns, decision, weight):
@@ -126,9 +127,9 @@ def test_time_since_the_last_fix_counts_from_radio_that_was_believed():
         ranges_at(5 * SECOND, Decision.DOWNWEIGHTED, 0.3),
         update_at(7 * SECOND, fates=(gyro,)),
     ]
-    since = match(instants, updates).since_fix_s
+    since = match(instants, Track.of(updates)).since_fix_s
     np.testing.assert_array_equal(since, [math.nan, 1.0, 3.0, 1.0, 3.0])
-    assert np.isnan(match(instants, updates[1:2]).since_fix_s).all()
+    assert np.isnan(match(instants, Track.of(updates[1:2])).since_fix_s).all()
 
 
 def test_track_alone_is_matched_as_its_updates_were():
@@ -136,11 +137,11 @@ def test_track_alone_is_matched_as_its_updates_were():
     updates = [update_at(k * SECOND, float(k)) for k in (0, 1, 1, 3)]
     updates[1] = updates[1]._replace(estimate=updates[1].estimate._replace(covariance=claimed, valid=False))
     instants = evaluation_instants(truth_at(np.arange(-1, 6) * SECOND))
-    by_updates = match(instants, updates)
-    by_track = match_track(instants, track_of([update.estimate for update in updates]))
+    by_updates = match(instants, Track.of(updates))
+    by_track = match(instants, Track.of_estimates([update.estimate for update in updates]))
     for column, other in zip(by_updates, by_track, strict=True):
         np.testing.assert_array_equal(column, other)
-    np.testing.assert_array_equal(track_of([updates[1].estimate]).covariance[0], claimed.matrix)
+    np.testing.assert_array_equal(Track.of_estimates([updates[1].estimate]).covariance_matrices[0], claimed.matrix)
 
 
 @settings(derandomize=True, deadline=None, max_examples=50)
@@ -148,7 +149,7 @@ def test_track_alone_is_matched_as_its_updates_were():
 def test_matching_agrees_with_its_definition(arrivals, asked):
     updates = [update_at(time_ns, float(i)) for i, time_ns in enumerate(arrivals)]
     instants = evaluation_instants(truth_at(sorted(asked)), hz=1e9)
-    answers = match(instants, updates, max_age_s=10e-9)
+    answers = match(instants, Track.of(updates), max_age_s=10e-9)
     for t, valid, x in zip(instants.time_ns, answers.valid, answers.x, strict=True):
         received = [u for i, u in enumerate(updates) if max(arrivals[: i + 1]) <= t]
         newest = max(received, key=lambda u: (u.estimate.time_ns, u.estimate.pose.x), default=None)

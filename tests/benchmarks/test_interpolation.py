@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.instants import Track
 from benchmarks.interpolation import meet
 from benchmarks.quantiles import Ordered, mean, quantile
 from benchmarks.score import errors, metrics
+from benchmarks.track import Track
 from logs.run import TruthTrack
 
 
@@ -22,8 +22,8 @@ def truth_of(time_s, x):
 
 
 def track_of(time_s, x):
-    none, n = np.zeros(len(time_s)), len(time_s)
-    return Track(stamps(time_s), np.ones(n, bool), np.asarray(x, float), none, none, np.full((n, 3, 3), np.nan))
+    none = np.zeros(len(time_s))
+    return Track.of_poses(stamps(time_s), np.asarray(x, float), none, none)
 
 
 def test_stamps_that_differ_by_24_ms_make_no_error():

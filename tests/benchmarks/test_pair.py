@@ -32,7 +32,7 @@ def paired(truth, estimate):
     """Pose k with pose k, whatever their stamps."""
     true, said = read_truth(truth), read_track(estimate)
     ages = np.zeros(len(true)), np.full(len(true), np.nan)
-    answers = Answers(said.valid, said.x, said.y, said.heading, said.covariance, *ages)
+    answers = Answers(said.usable, *said.pose[:, :2].T, said.heading, said.covariance_matrices, *ages)
     return Instants(true.time_ns, true.x, true.y, true.heading), answers
 
 

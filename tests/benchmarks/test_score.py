@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from benchmarks.instants import Instants, evaluation_instants, match
 from benchmarks.score import errors, for_json, metrics, pool, quantile
+from benchmarks.track import Track
 from fusion import Covariance, Estimate, Odometry, Pose, Update, wrap_angle
 from logs.run import TruthTrack
 
@@ -39,7 +40,7 @@ def oracle_updates(count=1000, *, covariance=True, heading_known=True):
 
 def scores_of(updates, truth=TRUTH):
     instants = evaluation_instants(truth)
-    return metrics(errors(instants, match(instants, updates)))
+    return metrics(errors(instants, match(instants, Track.of(updates))))
 
 
 ORACLE_A = {
@@ -192,7 +193,7 @@ def test_pooling_weighs_every_instant_alike():
             for k, x in enumerate(position)
         ]
         instants = evaluation_instants(truth)
-        return errors(instants, match(instants, said))
+        return errors(instants, match(instants, Track.of(said)))
 
     both = metrics(pool([run_of(1.0), run_of(3.0, math.inf, 3.0)]))
     assert both["n"] == 4.0
@@ -203,7 +204,7 @@ def test_pooling_weighs_every_instant_alike():
 def test_scores_of_no_instants_are_not_numbers():
     nothing = np.array([])
     instants = Instants(nothing.astype(np.int64), nothing, nothing, nothing)
-    scores = metrics(errors(instants, match(instants, [])))
+    scores = metrics(errors(instants, match(instants, Track.of([]))))
     counts = {"n", "n_valid", "failures", *(name for name in scores if name.endswith("_n"))}
     assert all(scores[name] == 0.0 for name in counts)
     assert all(math.isnan(scores[name]) for name in set(scores) - counts)
@@ -229,7 +230,7 @@ AXES = ("abs_", "bias_", "cov_", "coverage")
 @given(st.floats(-3.0, 3.0), st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.integers(0, 400))
 def test_turning_and_moving_the_world_leaves_all_but_the_axis_metrics(yaw, shift_x, shift_y, dead):
     instants = evaluation_instants(TRUTH)
-    answers = match(instants, oracle_updates())
+    answers = match(instants, Track.of(oracle_updates()))
     answers = answers._replace(valid=np.arange(1000) >= dead, since_fix_s=np.arange(1000) % 7 / 10.0)
     cos, sin = math.cos(yaw), math.sin(yaw)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])

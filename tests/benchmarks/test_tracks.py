@@ -39,7 +39,7 @@ def test_tum_file_is_read_to_the_nanosecond(tmp_path):
     path = write(tmp_path / "a.tum", "# a comment", "1652380260.171842098 1 2 0 0 0 0 1", "1652380261 3 4 0 0 0 1 0")
     track = read_track(path)
     assert track.time_ns.tolist() == [START_NS, 1_652_380_261_000_000_000]
-    assert (track.x.tolist(), track.y.tolist()) == ([1.0, 3.0], [2.0, 4.0])
+    assert track.pose[:, :2].tolist() == [[1.0, 2.0], [3.0, 4.0]]
     assert track.heading.tolist() == [0.0, math.pi]
     assert track.valid.all()
     assert np.isnan(track.covariance).all()
@@ -98,9 +98,9 @@ def test_lane_of_a_log_keeps_claims_and_what_was_not_valid_is_not_in_it(tmp_path
     track = read_track(f"{log}:ekf")
     assert track.valid.all()
     assert (track.time_ns - START_NS).tolist() == [0, 200_000_000, 300_000_000, 400_000_000]
-    np.testing.assert_allclose(track.covariance[0], np.diag([0.01, 0.04, 0.09]), rtol=1e-12)
+    np.testing.assert_allclose(track.covariance_matrices[0], np.diag([0.01, 0.04, 0.09]), rtol=1e-12)
     only = log_at(tmp_path / "one.mcap", "ekf")
-    np.testing.assert_array_equal(read_track(only).x, track.x)
+    np.testing.assert_array_equal(read_track(only).pose, track.pose)
 
 
 TUM, CSV = "0 0 0 0 0 0 0 1", "time_s,x_m,y_m,heading_rad"
