@@ -51,18 +51,20 @@ def _overview(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa:
     errors = [plot(frame, title, origin, legend=len(drawn) <= SHOWN) for title, origin in titles.items()]
     details = _details(frame, drawn)
     right = [(tabs(errors), 2.0)] if has_truth else []
-    right += [(tabs(_reception(frame, run, drawn)), 1.8)]
-    right += [(tabs(details), 3.2)] if details else []
+    right += [_reception(frame, run, drawn)]
+    right += [(tabs(details), 3.6)] if details else []
     views, shares = zip(*right, strict=True)
     return rrb.Horizontal(left, rrb.Vertical(*views, row_shares=shares), column_shares=[3, 2], name="Overview")
 
 
-def _reception(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> list[Any]:
-    """What the radio said and what was made of it; in front is that which has something to tell."""
+def _reception(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> tuple[Any, float]:
+    """What the radio said and what was made of it, and their height; in front is what has something to tell."""
     told = [drawing for drawing in drawn if drawing.shown and drawing.states.state]
     lanes = [state_view(frame, told)] if told else []
     eventful = any(state in (State.REJECT, State.LOST) for drawing in told for state in drawing.states.state)
-    return lanes + _radio(frame, run) if eventful else _radio(frame, run) + lanes
+    if eventful:
+        return tabs(lanes + _radio(frame, run)), max(1.5, 0.6 + 0.28 * len(told))
+    return tabs(_radio(frame, run) + lanes), 1.8
 
 
 def _radio(frame: Frame, run: Run) -> list[Any]:

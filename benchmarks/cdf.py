@@ -24,6 +24,9 @@ POINTS = 400
 """Corners of one curve."""
 NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
 TICKS = 5
+HEADROOM = 1.05
+LEAST_M = 0.001
+"""Nobody looks closer than that."""
 SHARES = (0.25, 0.5, 0.75, 0.95)
 
 
@@ -35,9 +38,9 @@ class CdfAxes(NamedTuple):
 
     @classmethod
     def around(cls, errors_m: Sequence[Floats]) -> CdfAxes:
-        """Axes that hold 95 % of the finite errors (n,) [m] of each estimator, in round steps."""
+        """Axes that hold 95 % of the finite errors (n,) [m] of each estimator, in about `TICKS` round steps."""
         reach = [quantile(finite, 0.95) for own in errors_m if len(finite := own[np.isfinite(own)])]
-        largest = max(reach, default=1.0) or 1.0
+        largest = max(HEADROOM * max(reach, default=1.0), LEAST_M)
         power = 10.0 ** math.floor(math.log10(largest / TICKS))
         step = next(nice * power for nice in NICE if nice * power * TICKS >= largest * (1.0 - 1e-9))
         return cls(step * math.ceil(largest / step - 1e-9), step)

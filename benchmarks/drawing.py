@@ -117,14 +117,14 @@ class Drawing:
 
 
 def drawings(run: Run, lanes: Sequence[Lane], scores: Sequence[Score]) -> list[Drawing]:
-    """The lanes with their scores, one by one, the best first. Ghosts were asked for, so they are always shown."""
+    """The lanes with their scores, one by one, the best first. A ghost is shown where its estimator is."""
     instants = None if run.truth is None else evaluation_instants(run.truth)
     by_name = {lane.name: lane for lane in lanes}
     ranking = [(by_name[score.estimator], score) for score in ranked(scores)]
     best = [lane.name for lane, _ in ranking if lane.ghost_of is None][:SHOWN]
     drawn = []
     for rank, (lane, score) in enumerate(ranking):
-        shown = lane.ghost_of is not None or lane.name in best
+        shown = (lane.ghost_of or lane.name) in best
         compared = instants if score.errors is not None and lane.error is None else None
         answers = None if compared is None else match(compared, lane.track)
         drawn.append(Drawing(lane, score, rank, shown, compared, answers))

@@ -4,11 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from scipy.special import gammaincinv
 
 import fusion
 from benchmarks.canvas import MOST_POSES, thinned
 from benchmarks.cell import Cell, score_lane
 from benchmarks.colours import ESTIMATORS, colour_of
+from benchmarks.counterfactual import ghost_lane, without_anchor
+from benchmarks.estimator_plots import NEES_BOUNDS
 from benchmarks.lane import run_lane
 from benchmarks.paths import mostly_jumps
 from benchmarks.scene import markdown, write_scene
@@ -102,10 +105,14 @@ def scored(run, names):
 
 def review_of(tmp_path, *names, with_truth=True):
     """The chunks of a review by entity path."""
-    from rerun.chunk import RrdReader
-
     run = run_of(tmp_path, with_truth=with_truth)
     (scene,) = write_scene(tmp_path / "review.rrd", run, *scored(run, names))
+    return chunks_of(scene)
+
+
+def chunks_of(scene):
+    from rerun.chunk import RrdReader
+
     chunks = {}
     for chunk in RrdReader(scene).stream().to_chunks():
         chunks.setdefault(str(chunk.entity_path), []).append(chunk.to_record_batch())
@@ -154,6 +161,108 @@ def test_ellipse_is_the_95_percent_region_turned_the_right_way(tmp_path):
     region = rotation @ np.diag([a**2, b**2]) @ rotation.T / 5.991464547107979
     assert (x, y) == (0.0, 0.0)
     assert np.allclose(region, [[0.04, 0.03], [0.03, 0.04]], atol=1e-6)
+
+
+def test_error_line_goes_from_the_estimate_to_the_truth(tmp_path):
+    time, strips = column(review_of(tmp_path, "toy"), "/map/estimate/toy/error", "strips")
+    assert time[4] == np.timedelta64(2, "s")
+    assert strips[4] == [[[2.0, 0.5], [2.0, 0.0]]]
+
+
+def test_circles_are_those_of_the_last_update_in_the_colour_of_their_weight(tmp_path):
+    chunks = review_of(tmp_path, "toy")
+    path = "/map/estimate/toy/readings"
+    _, centers = column(chunks, path, "centers")
+    _, colours = column(chunks, path, "colors")
+    _, half_sizes = column(chunks, path, "half_sizes")
+    assert centers[0] == [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]]
+    assert [len(row) for row in centers] == [3] * 9
+    radius_m = float(WORLD.anchors[1].radio.distance(-50.0))
+    assert np.allclose(half_sizes[0][1], radius_m)
+    assert {tuple(row) for row in colours[::2]} == {(colours[0][0],) * 3}
+    assert colours[0][0] != colours[1][0]
+
+
+def test_claim_is_drawn_about_zero_and_the_error_on_it(tmp_path):
+    chunks = review_of(tmp_path, "toy")
+    _, variances = column(chunks, "/consistency/toy/y/claim", "variances")
+    _, values = column(chunks, "/consistency/toy/y/claim", "values")
+    _, error = column(chunks, "/consistency/toy/y/error", "Scalars")
+    assert np.allclose(np.ravel(variances), 0.04)
+    assert np.allclose(np.ravel(values), 0.0)
+    assert np.allclose(np.ravel(error), 0.5)
+    _, heading = column(chunks, "/consistency/toy/heading/claim", "variances")
+    assert np.allclose(np.sqrt(np.ravel(heading)), np.degrees(0.1)), "in degrees"
+
+
+def test_nees_lies_beside_its_bounds_of_three_degrees(tmp_path):
+    chunks = review_of(tmp_path, "toy")
+    _, lower = column(chunks, "/nees/toy/lower", "Scalars")
+    _, upper = column(chunks, "/nees/toy/upper", "Scalars")
+    assert [np.ravel(lower)[0], np.ravel(upper)[0]] == [chi_square(0.025, 3), chi_square(0.975, 3)]
+    _, nees = column(chunks, "/nees/toy/NEES", "Scalars")
+    # (0, 0.5) in the inverse of [[0.04, 0.03], [0.03, 0.04]]: 0.25 * 0.04 / (0.04² - 0.03²).
+    assert np.allclose(np.ravel(nees), 0.01 / 0.0007)
+
+
+def chi_square(share, degrees):
+    return pytest.approx(2.0 * gammaincinv(degrees / 2.0, share))
+
+
+def test_bounds_of_two_degrees_are_those_of_the_chi_square_too():
+    assert NEES_BOUNDS[2] == (chi_square(0.025, 2), chi_square(0.975, 2))
+
+
+def test_states_and_events_stand_at_their_times(tmp_path):
+    chunks = review_of(tmp_path, "toy")
+    time, states = column(chunks, "/state/toy", "StateChange")
+    assert [state for (state,) in states][:3] == ["ACCEPT", "REJECT", "ACCEPT"]
+    assert time[1] == np.timedelta64(500, "ms")
+    _, texts = column(chunks, "/events/toy", "text")
+    assert texts[0] == ["0.5 s  02:00:5e:00 rejected: gate, NIS 0.2"]
+    assert len(texts) == 12
+
+
+def test_folder_gets_a_base_and_a_layer_for_each_estimator_of_one_recording(tmp_path):
+    run = run_of(tmp_path)
+    base, toy, ghost = write_scene(tmp_path / "layers", run, *ghosted(run))
+    assert [file.name for file in (base, toy, ghost)] == ["base.rrd", "toy.rrd", "toy without 02%3A00%3A5e%3A00.rrd"]
+    assert recordings([base, toy, ghost]) == {("fusion", f"test run {WORLD.hash[:12]}")}
+    in_base, in_toy = chunks_of(base).keys(), chunks_of(toy).keys()
+    assert {"/map/walls", "/map/truth/path", "/rssi/b", "/scores", "/cdf/grid"} <= in_base
+    assert "/map/estimate/toy/path" in in_toy
+    assert not in_base & in_toy
+
+
+def test_layers_together_hold_what_one_file_holds(tmp_path):
+    run = run_of(tmp_path)
+    layers = write_scene(tmp_path / "layers", run, *ghosted(run))
+    (single,) = write_scene(tmp_path / "one.rrd", run, *ghosted(run))
+    assert {path for layer in layers for path in chunks_of(layer)} == set(chunks_of(single))
+
+
+def test_ghost_has_a_track_errors_and_a_row_in_the_table_and_nothing_else(tmp_path):
+    run = run_of(tmp_path)
+    lanes, scores = ghosted(run)
+    *_, ghost = write_scene(tmp_path / "layers", run, lanes, scores)
+    name = r"toy\ without\ 02\:00\:5e\:00"
+    own = {path for path in chunks_of(ghost) if not path.startswith("/__")}
+    parts = {f"/map/estimate/{name}/{part}" for part in ("path", "trail", "pose", "error")}
+    assert own == parts | {f"/{place}/{name}" for place in ("map/legend", "error", "heading_error", "cdf/estimate")}
+    assert "| toy without 02:00:5e:00 |" in markdown(scores)
+
+
+def ghosted(run):
+    lanes, scores = scored(run, ["toy"])
+    what_if = without_anchor(run, "02:00:5e:00")
+    ghost = ghost_lane("toy", what_if, 0)
+    return [*lanes, ghost], [*scores, score_lane(Cell(run.path, ghost.name, {}, 0), what_if.run, ghost)]
+
+
+def recordings(files):
+    from rerun.chunk import RrdReader
+
+    return {(store.application_id, store.recording_id) for file in files for store in RrdReader(file).recordings()}
 
 
 def test_run_without_truth_is_drawn_without_errors(tmp_path):
