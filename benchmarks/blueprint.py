@@ -59,7 +59,7 @@ def _overview(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa:
 
 def _reception(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> tuple[Any, float]:
     """What the radio said and what was made of it, and their height; in front is what has something to tell."""
-    told = [drawing for drawing in drawn if drawing.shown and drawing.states.state]
+    told = [drawing for drawing in drawn if drawing.shown and not drawing.ghost and drawing.states.state]
     lanes = [state_view(frame, told)] if told else []
     eventful = any(state in (State.REJECT, State.LOST) for drawing in told for state in drawing.states.state)
     if eventful:

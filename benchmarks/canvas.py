@@ -21,7 +21,7 @@ MOST_POSES = 6000
 FAINT, STRONG = 80, 255
 """Opacity of whole tracks and of what is at the time cursor."""
 
-Path = Sequence[str]
+Place = Sequence[str]
 """An entity's place in the recording, part by part: a part may hold any character."""
 Rows = TypeVar("Rows", NDArray[np.int64], Floats)
 
@@ -33,24 +33,24 @@ class Canvas(NamedTuple):
     recording: Any
     start_ns: int
 
-    def style(self, path: Path, *archetypes: Any) -> None:  # noqa: ANN401 - Rerun's own values
+    def style(self, path: Place, *archetypes: Any) -> None:  # noqa: ANN401 - Rerun's own values
         """What holds at all times."""
         self.recording.log(self.rr.new_entity_path(list(path)), *archetypes, static=True)
 
-    def columns(self, path: Path, time_ns: Stamps, *columns: Any) -> None:  # noqa: ANN401
+    def columns(self, path: Place, time_ns: Stamps, *columns: Any) -> None:  # noqa: ANN401
         """One row per time [ns]."""
         index = self.rr.TimeColumn(TIMELINE, duration=(time_ns - self.start_ns).astype("timedelta64[ns]"))
         for column in columns:
             self.recording.send_columns(self.rr.new_entity_path(list(path)), [index], column)
 
-    def dots(self, path: Path, name: str, colour: Colour, time_ns: Stamps, values: Floats) -> None:
+    def dots(self, path: Place, name: str, colour: Colour, time_ns: Stamps, values: Floats) -> None:
         """A dot per (time [ns], value)."""
         look = self.rr.SeriesPoints.from_fields(names=[name], colors=[colour], marker_sizes=[2.0])
         self._series(path, look, time_ns, values)
 
     def line(
         self,
-        path: Path,
+        path: Place,
         name: str,
         colour: Colour,
         time_ns: Stamps,
@@ -68,13 +68,15 @@ class Canvas(NamedTuple):
         look["aggregation_policy"] = getattr(self.rr.components.AggregationPolicy, merge)
         self._series(path, self.rr.SeriesLines.from_fields(**look), time_ns, values)
 
-    def _series(self, path: Path, look: Any, time_ns: Stamps, values: Floats) -> None:  # noqa: ANN401
+    def _series(self, path: Place, look: Any, time_ns: Stamps, values: Floats) -> None:  # noqa: ANN401
         finite = np.isfinite(values)
         if finite.any():
             self.style(path, look)
             self.columns(path, time_ns, self.rr.Scalars.columns(scalars=np.where(finite, values, np.nan)))
 
-    def label(self, path: Path, text: str, colour: Colour, place: tuple[float, float], *, radius: float = -6.0) -> None:
+    def label(
+        self, path: Place, text: str, colour: Colour, place: tuple[float, float], *, radius: float = -6.0
+    ) -> None:
         """A labelled dot at all times; negative radii are pixels."""
         look = {"colors": [colour], "radii": [radius], "labels": [text], "show_labels": True}
         self.style(path, self.rr.Points2D([place], **look))

@@ -11,12 +11,11 @@ import numpy as np
 
 from benchmarks.cell import Score
 from benchmarks.colours import Colour, colour_of
-from benchmarks.columns import DrawnFates, DrawnTrack, EstimateColumns
+from benchmarks.columns import EstimateColumns, FateColumns, Track
 from benchmarks.events import Events, States, events, states
-from benchmarks.instants import Answers, Instants, evaluation_instants, match, wrap_angles
+from benchmarks.instants import Answers, Floats, Instants, evaluation_instants, match, wrap_angles
 from benchmarks.lane import Lane
 from benchmarks.table import ranked
-from benchmarks.track import Floats
 from fusion import Reason
 from logs.run import Run
 
@@ -44,13 +43,12 @@ def signed_errors(instants: Instants, answers: Answers) -> SignedErrors:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A lane with its score. ``rank`` counts from 0, the best. ``instants`` and ``answers`` belong together; they are
+    """A lane with its score. ``instants`` and ``answers`` belong together; they are
     None where there is nothing to compare: no truth, or a lane that crashed.
     """
 
     lane: Lane
     score: Score
-    rank: int
     shown: bool
     instants: Instants | None
     answers: Answers | None
@@ -71,9 +69,9 @@ class Drawing:
         return colour_of(self.lane.ghost_of or self.lane.name)
 
     @cached_property
-    def track(self) -> DrawnTrack:
+    def track(self) -> Track:
         """The path."""
-        return DrawnTrack.of_updates(self.lane.final, self.estimates.valid)
+        return Track.of_updates(self.lane.final, self.estimates.valid)
 
     @cached_property
     def estimates(self) -> EstimateColumns:
@@ -81,9 +79,9 @@ class Drawing:
         return EstimateColumns.of_updates(self.lane.final)
 
     @cached_property
-    def fates(self) -> DrawnFates:
+    def fates(self) -> FateColumns:
         """What became of the readings; of a ghost's nothing is shown."""
-        return DrawnFates.of_updates(() if self.ghost else self.lane.final)
+        return FateColumns.of_updates(() if self.ghost else self.lane.final)
 
     @cached_property
     def states(self) -> States:
@@ -123,9 +121,9 @@ def drawings(run: Run, lanes: Sequence[Lane], scores: Sequence[Score]) -> list[D
     ranking = [(by_name[score.estimator], score) for score in ranked(scores)]
     best = [lane.name for lane, _ in ranking if lane.ghost_of is None][:SHOWN]
     drawn = []
-    for rank, (lane, score) in enumerate(ranking):
+    for lane, score in ranking:
         shown = (lane.ghost_of or lane.name) in best
         compared = instants if score.errors is not None and lane.error is None else None
-        answers = None if compared is None else match(compared, lane.track)
-        drawn.append(Drawing(lane, score, rank, shown, compared, answers))
+        answers = None if compared is None else match(compared, lane.updates)
+        drawn.append(Drawing(lane, score, shown, compared, answers))
     return drawn

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.canvas import STRONG, Canvas, Path, thinned
+from benchmarks.canvas import STRONG, Canvas, Place, thinned
 from benchmarks.colours import ANCHOR, REFUSED
 from benchmarks.drawing import Drawing
 from benchmarks.heard import Heard
@@ -36,7 +36,7 @@ def draw_on_map(canvas: Canvas, world: World, readings: Heard, drawing: Drawing,
         _draw_circles(canvas, [*place, "readings"], world, readings, drawing)
 
 
-def _draw_ellipses(canvas: Canvas, place: Path, drawing: Drawing) -> None:
+def _draw_ellipses(canvas: Canvas, place: Place, drawing: Drawing) -> None:
     """The 95 % region of each position that claims a covariance: its half axes are the roots of the covariance's
     eigenvalues times the chi-square value of two degrees.
     """
@@ -59,7 +59,7 @@ def _draw_ellipses(canvas: Canvas, place: Path, drawing: Drawing) -> None:
     )
 
 
-def _draw_error_line(canvas: Canvas, place: Path, drawing: Drawing) -> None:
+def _draw_error_line(canvas: Canvas, place: Place, drawing: Drawing) -> None:
     """From the estimate to the truth at that time; no line while there is no valid answer."""
     if drawing.instants is None or drawing.answers is None:
         return
@@ -75,7 +75,7 @@ def _draw_error_line(canvas: Canvas, place: Path, drawing: Drawing) -> None:
     canvas.columns(place, drawing.instants.time_ns[chosen], rows)
 
 
-def _draw_circles(canvas: Canvas, place: Path, world: World, readings: Heard, drawing: Drawing) -> None:
+def _draw_circles(canvas: Canvas, place: Place, world: World, readings: Heard, drawing: Drawing) -> None:
     """Where each reading of the last update puts the robot, a circle around its anchor: in the anchor's yellow
     when the estimator believed it wholly, vermillion when not at all.
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.canvas import FAINT, STRONG, Canvas, Path, thinned
+from benchmarks.canvas import FAINT, STRONG, Canvas, Place, thinned
 from benchmarks.colours import Colour
 from benchmarks.track import Floats, Stamps
 from fusion.values import NANOSECONDS
@@ -14,7 +14,7 @@ JUMP_M_S = 5.0
 
 
 def draw_path(
-    canvas: Canvas, place: Path, colour: Colour, time_ns: Stamps, xy: Floats, *, thickness: float = 1.0
+    canvas: Canvas, place: Place, colour: Colour, time_ns: Stamps, xy: Floats, *, thickness: float = 1.0
 ) -> None:
     """Positions ``xy`` (n, 2) [m]; how far back the strong part goes is the layout's to say."""
     rr = canvas.rr
