@@ -93,12 +93,12 @@ class Drawing:
         """What happened to it."""
         return events(self.lane.final, self.estimates, self.fates)
 
-    @property
+    @cached_property
     def gates(self) -> bool:
         """Whether it listens to the radio at all, so that there is a weight to show."""
         return not bool(self.fates.of(Reason.KIND_NOT_CONSUMED).all())
 
-    @property
+    @cached_property
     def tells_nis(self) -> bool:
         """Whether any reading has an NIS."""
         return bool(np.isfinite(self.fates.nis).any())
@@ -108,7 +108,7 @@ class Drawing:
         """Its errors and what it claims of them."""
         return None if self.instants is None or self.answers is None else signed_errors(self.instants, self.answers)
 
-    @property
+    @cached_property
     def claims(self) -> list[bool]:
         """Whether it ever claims a variance of x, y and heading."""
         return [False] * 3 if self.errors is None else [bool(np.isfinite(v).any()) for v in self.errors.variance.T]
