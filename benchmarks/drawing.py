@@ -11,11 +11,12 @@ import numpy as np
 
 from benchmarks.cell import Score
 from benchmarks.colours import Colour, colour_of
-from benchmarks.columns import EstimateColumns, FateColumns, Track
+from benchmarks.columns import DrawnFates, DrawnTrack, EstimateColumns
 from benchmarks.events import Events, States, events, states
-from benchmarks.instants import Answers, Floats, Instants, evaluation_instants, match, wrap_angles
+from benchmarks.instants import Answers, Instants, evaluation_instants, match, wrap_angles
 from benchmarks.lane import Lane
 from benchmarks.table import ranked
+from benchmarks.track import Floats
 from fusion import Reason
 from logs.run import Run
 
@@ -69,9 +70,9 @@ class Drawing:
         return colour_of(self.lane.ghost_of or self.lane.name)
 
     @cached_property
-    def track(self) -> Track:
+    def track(self) -> DrawnTrack:
         """The path."""
-        return Track.of_updates(self.lane.final, self.estimates.valid)
+        return DrawnTrack.of_updates(self.lane.final, self.estimates.valid)
 
     @cached_property
     def estimates(self) -> EstimateColumns:
@@ -79,9 +80,9 @@ class Drawing:
         return EstimateColumns.of_updates(self.lane.final)
 
     @cached_property
-    def fates(self) -> FateColumns:
+    def fates(self) -> DrawnFates:
         """What became of the readings; of a ghost's nothing is shown."""
-        return FateColumns.of_updates(() if self.ghost else self.lane.final)
+        return DrawnFates.of_updates(() if self.ghost else self.lane.final)
 
     @cached_property
     def states(self) -> States:
@@ -124,6 +125,6 @@ def drawings(run: Run, lanes: Sequence[Lane], scores: Sequence[Score]) -> list[D
     for lane, score in ranking:
         shown = (lane.ghost_of or lane.name) in best
         compared = instants if score.errors is not None and lane.error is None else None
-        answers = None if compared is None else match(compared, lane.updates)
+        answers = None if compared is None else match(compared, lane.track)
         drawn.append(Drawing(lane, score, shown, compared, answers))
     return drawn

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.columns import EstimateColumns, FateColumns
+from benchmarks.columns import DrawnFates, EstimateColumns
 from benchmarks.events import State, events, states
 from fusion import Decision, Estimate, Fate, Pose, Reason, RssiReading, Update, WifiScan
 
@@ -23,12 +23,12 @@ def update(second, *judgements, nis=None, **claims):
 
 
 def told_states(*updates):
-    changes = states(EstimateColumns.of_updates(updates), FateColumns.of_updates(updates))
+    changes = states(EstimateColumns.of_updates(updates), DrawnFates.of_updates(updates))
     return list(zip((changes.time_ns // SECOND_NS).tolist(), changes.state, strict=True))
 
 
 def told_events(*updates):
-    told = events(updates, EstimateColumns.of_updates(updates), FateColumns.of_updates(updates))
+    told = events(updates, EstimateColumns.of_updates(updates), DrawnFates.of_updates(updates))
     return list(zip((told.time_ns // SECOND_NS).tolist(), told.level, told.text, strict=True))
 
 
@@ -88,7 +88,7 @@ def test_resets_and_losses_are_told_once_each():
 
 
 def test_columns_keep_what_the_fates_say():
-    columns = FateColumns.of_updates([update(1, TAKEN), update(2), update(3, GATED, TAKEN, nis=2.0)])
+    columns = DrawnFates.of_updates([update(1, TAKEN), update(2), update(3, GATED, TAKEN, nis=2.0)])
     assert columns.update.tolist() == [0, 2, 2]
     assert columns.name.tolist() == ["ap0", "ap0", "ap1"]
     assert columns.of(Decision.USED).tolist() == [True, False, True]
