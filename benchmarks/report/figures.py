@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINES = ("-", "--", ":", "-.")
+BAND = ("anees", "anees_band_low", "anees_band_high")
 LONGEST_LINE = 2000
 """Points a line is thinned to: a picture shows no more."""
 
@@ -79,15 +80,17 @@ def _paired(axes: Axes, material: Material) -> None:
 
 
 def _consistency(axes: Axes, material: Material) -> None:
-    """ANEES of every cell without faults; the grey band is half to twice of what is honest."""
+    """ANEES of every cell without faults; the grey line beside it is where an honest filter's lies with 95 %: its
+    chi-square band at the effective number of samples.
+    """
     grouped = by_contestant(material.results)
-    axes.axhspan(0.5, 2.0, color="0.9", zorder=0)
     axes.axhline(1.0, color="0.5", linewidth=1, zorder=1)
     for place, name in enumerate(material.contestants):
-        values = np.array([result.metrics.get("anees", np.nan) for result in grouped[name]])
-        values = values[np.isfinite(values)]
-        colour = plain_colour(_use(material, name))
-        axes.scatter(np.full(len(values), place), values, color=colour, s=24, zorder=2)
+        found = [tuple(result.metrics.get(key, np.nan) for key in BAND) for result in grouped[name]]
+        values, low, high = np.array(found).T
+        across = place + np.linspace(-0.2, 0.2, len(values) + 2)[1:-1]
+        axes.vlines(across, low, high, color="0.8", linewidth=3, zorder=1)
+        axes.scatter(across, values, color=plain_colour(_use(material, name)), s=18, zorder=2)
     axes.set_yscale("log")
     plain_ticks(axes.yaxis)
     axes.set_xticks(range(len(material.contestants)), material.contestants, rotation=30, ha="right")

@@ -27,8 +27,8 @@ from benchmarks.sheet import Sheet, as_markdown
 EXPLAINED = {
     "summary": (
         "Left: a curve ends at the availability, since an instant without a valid answer is never reached. Middle: "
-        "verdicts rest on what happens along the grey lines, one per run. Right: 1 is honest; at 10 errors are three "
-        "times what the covariance claims."
+        "verdicts rest on what happens along the grey lines, one per run. Right: an honest dot lies on its grey line "
+        "with 95 %; at 10 errors are three times what the covariance claims."
     ),
     "over_time": "Gaps are instants without a valid answer.",
     "maps": "The best estimator's track, coloured by its error, over the true path; triangles are anchors.",

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from enum import IntEnum, unique
@@ -65,6 +66,7 @@ def judge(results: Sequence[Result], gate: Gate, baseline: Baseline | None) -> l
     for name, own in by_contestant(results, CLEAN).items():
         for metric, least in gate.floor.items():
             findings.append(_floor(name, own, metric, least))
+        findings += [_inside(name, own, metric) for metric in gate.inside]
         if baseline is not None:
             findings += _against(name, own, gate, baseline.get(name))
     return findings
@@ -74,6 +76,17 @@ def _floor(name: str, own: Sequence[Result], metric: str, least: float) -> Findi
     worst = min(result.metrics.get(metric, float("-inf")) for result in own)
     text = f"{name}: {metric} is {worst:g} at worst, {least:g} at least is asked"
     return Finding(Outcome.PASS if worst >= least else Outcome.REGRESSION, text)
+
+
+def _inside(name: str, own: Sequence[Result], metric: str) -> Finding:
+    """Whether every cell lies in its own chi-square band, which counts how correlated its errors are in time."""
+    keys = (metric, f"{metric}_band_low", f"{metric}_band_high")
+    value, low, high = np.array([[result.metrics.get(key, math.nan) for key in keys] for result in own]).T
+    if not np.isfinite([value, low, high]).all():
+        return Finding(Outcome.CANNOT_TELL, f"{name}: {metric} has no band in every cell; it claims no covariance, say")
+    outside = np.flatnonzero((value < low) | (value > high))
+    text = f"{name}: {metric} lies outside its band in {len(outside)} of {len(own)} cells"
+    return Finding(Outcome.REGRESSION if len(outside) else Outcome.PASS, text)
 
 
 def _against(name: str, own: Sequence[Result], gate: Gate, before: Sequence[Mapping[str, Any]] | None) -> list[Finding]:

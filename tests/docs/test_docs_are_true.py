@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.runner.definition import load_suite
 from fusion import World
 from fusion.cli import VERBS
 
@@ -30,6 +31,16 @@ def test_world_file_of_the_docs_loads_and_states_the_defaults():
     bare = World.from_table({"anchors": [{"id": "a", "position_m": [0, 0]}]})
     assert world.robot.noise == bare.robot.noise
     assert world.anchor("ap1").radio == bare.anchors[0].radio
+
+
+def test_suite_of_the_docs_is_a_suite(tmp_path):
+    (text,) = blocks(ROOT / "docs" / "benchmark.md", "toml")
+    (tmp_path / "hall.toml").write_text(text, encoding="utf-8")
+    suite = load_suite(tmp_path / "hall.toml")
+    assert [contestant.params for contestant in suite.contestants] == [
+        {"gate_probability": 0.99},
+        {"gate_probability": 0.999},
+    ]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

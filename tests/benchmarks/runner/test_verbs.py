@@ -122,6 +122,17 @@ def test_gate_holds_the_worst_cell_against_a_floor(results):
     assert Outcome.REGRESSION in outcomes(judge(spoilt, Gate(floor={"availability": 0.99}), None))
 
 
+@pytest.mark.parametrize(
+    ("anees", "expected"),
+    [(1.0, Outcome.PASS), (3.0, Outcome.REGRESSION), (0.1, Outcome.REGRESSION), (float("nan"), Outcome.CANNOT_TELL)],
+)
+def test_gate_holds_every_cell_inside_its_own_band(results, anees, expected):
+    band = {"anees": 1.0, "anees_band_low": 0.5, "anees_band_high": 1.8}
+    honest = [result._replace(metrics={**result.metrics, **band}) for result in results]
+    one = honest[0]._replace(metrics={**honest[0].metrics, "anees": anees})
+    assert outcomes(judge([one, *honest[1:]], Gate(inside=("anees",)), None)) == {expected, Outcome.PASS}
+
+
 def test_a_cell_that_is_lost_now_and_was_not_before_is_a_regression(results):
     lost = [results[0]._replace(status="crashed"), *results[1:]]
     assert outcomes(judge(lost, Gate(), baseline_of(results))) == {Outcome.REGRESSION}
