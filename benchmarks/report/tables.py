@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from benchmarks.posterior import eff_pcrlb, posterior_bound
 from benchmarks.report.material import Material
 from benchmarks.report.worst import Moment, command
 from benchmarks.runner.definition import CLEAN
@@ -53,6 +54,22 @@ def faults(material: Material) -> Sheet:
 
 def _times(ratio: float) -> str:
     return "∞" if not math.isfinite(ratio) else f"{ratio:.2f}×"
+
+
+def limits(material: Material) -> Sheet:
+    """How many times the posterior Cramér-Rao bound of the run each contestant errs, over the shown runs."""
+    bounds = {run_id: posterior_bound(material.run(run_id)) for run_id in material.scored_runs}
+    rows = []
+    for name in material.contestants:
+        cells = []
+        for run_id, bound in bounds.items():
+            series = material.series.get((run_id, name))
+            same = series is not None and np.array_equal(series.instants.time_ns, bound.time_ns)
+            ratio = eff_pcrlb(series.error_m[None], bound.error_m[None]) if series is not None and same else math.nan
+            cells.append("–" if math.isnan(ratio) else f"{ratio:.2f}×")
+        rows.append((name, *cells))
+    title = "Times the physical limit: RMSE over the posterior Cramér-Rao bound of the run (0.89 is perfect in one run)"
+    return Sheet(title, ("estimator", *bounds), tuple(rows))
 
 
 def moments(found: Sequence[Moment]) -> Sheet:

@@ -36,15 +36,15 @@ EXPLAINED = {
 }
 
 
-def report(material: Material, command: str) -> str:
-    """The page as Markdown with its figures in it."""
+def report(material: Material, command: str, *, limit: bool = False) -> str:
+    """The page as Markdown with its figures in it; with ``limit`` also how far from the physical limit all are."""
     suite = material.suite
     about = (
         f"{len(suite.runs)} runs, {len(material.contestants)} estimators, {len(suite.faults)} fault sets, "
         f"{suite.seeds} seeds: {len(material.results)} cells. Errors are horizontal distances to the truth, raw: "
         "nothing is aligned. An instant without a valid answer counts as infinite."
     )
-    parts = [f"# {suite.name}", *_verdicts(material), about, *map(as_markdown, _sheets(material))]
+    parts = [f"# {suite.name}", *_verdicts(material), about, *map(as_markdown, _sheets(material, limit=limit))]
     if material.scored_runs:
         for name, draw in FIGURES.items():
             if name == "cost" and not material.timing:
@@ -63,10 +63,12 @@ def _verdicts(material: Material) -> Iterator[str]:
     yield "\n".join(f"- {sentence}" for sentence in told)
 
 
-def _sheets(material: Material) -> Iterator[Sheet]:
+def _sheets(material: Material, *, limit: bool) -> Iterator[Sheet]:
     yield tables.leaderboard(material)
     if material.comparison is not None:
         yield sheet(material.comparison)
+    if limit and material.scored_runs:
+        yield tables.limits(material)
     if len(material.suite.faults) > 1:
         yield tables.faults(material)
     if found := worst_moments(material):
@@ -89,6 +91,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     suite_options(parser)
     parser.add_argument("--html", type=Path, metavar="F", help="one file, no network (needs the extra `plots`)")
     parser.add_argument("--markdown", type=Path, metavar="F", help="the same as Markdown, figures in it")
+    parser.add_argument("--limit", action="store_true", help="compare with the physical limit of each run; slower")
     parser.add_argument("--metric", default=RANKED_BY, help="what is compared; lower is better (%(default)s)")
 
 
@@ -97,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
     require_matplotlib()
     suite, results = stored_results(arguments)
     material = Material(suite, results, Store(arguments.store), arguments.metric)
-    page = report(material, f"fusion bench run {arguments.suite.name}")
+    page = report(material, f"fusion bench run {arguments.suite.name}", limit=arguments.limit)
     targets = [(arguments.markdown, page.encode())]
     if arguments.html or not arguments.markdown:
         targets.append((arguments.html or Path(f"{suite.name}.html"), as_html(suite.name, page)))

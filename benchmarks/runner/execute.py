@@ -12,6 +12,7 @@ from benchmarks.cell import status_of
 from benchmarks.faults import apply_faults
 from benchmarks.innovations import innovation_metrics
 from benchmarks.instants import evaluation_instants, match
+from benchmarks.interpolation import meet
 from benchmarks.lane import Lane, run_lane
 from benchmarks.runner.definition import CLEAN, CellLimits
 from benchmarks.runner.plan import Cell, read_faults
@@ -111,6 +112,10 @@ def _metrics(cell: Cell, track: Track) -> dict[str, float]:
     if truth is None or len(truth) == 0:
         return {}
     rules = cell.evaluation
+    if rules.reading == "interp":
+        met = meet(truth, track, gap_s=rules.gap_s)
+        scores = metrics(errors(met.instants, met.answers, met.weight))
+        return {**scores, "availability": met.availability}
     instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
     return metrics(errors(instants, match(instants, track, max_age_s=rules.max_age_s)))
 

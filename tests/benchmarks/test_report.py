@@ -74,6 +74,13 @@ def test_cost_is_drawn_once_it_was_measured(place, capsys):
     assert report(timed, "").count("data:image/png;base64,") == len(FIGURES)
 
 
+def test_distance_from_the_limit_is_told_where_it_is_asked_for(material):
+    assert "Times the physical limit" not in report(material, "")
+    page = report(material, "", limit=True)
+    (row,) = re.findall(r"\| wheels \| ([\d.]+)× \| ([\d.]+)× \|", page)
+    assert all(float(ratio) > 0.0 for ratio in row)
+
+
 def test_radio_without_radio_is_lost_and_said_to_be(material):
     page = report(material, "")
     assert re.search(r"\| radio \|.*∞", page)

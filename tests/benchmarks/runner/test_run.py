@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -90,14 +91,23 @@ def test_only_what_is_missing_runs_again(suite, tmp_path):
 
 
 def test_another_evaluation_scores_old_tracks_again_without_an_estimator(suite, tmp_path):
-    from dataclasses import replace
-
     store = Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
     stricter = replace(suite, evaluation=replace(suite.evaluation, max_age_s=0.5))
     todo = missing(cells_of(stricter, store), store)
     assert (len(todo.estimates), len(todo.scores)) == (0, 8)
     assert len(run_suite(stricter, store, workers=1)) == 8
+
+
+def test_interpolated_evaluation_is_another_score_of_the_same_estimates(tmp_path):
+    (tmp_path / "dense.toml").write_text(SUITE.replace("paper_", ""), encoding="utf-8")
+    suite, store = load_suite(tmp_path / "dense.toml"), Store(tmp_path / "store")
+    causal = run_suite(suite, store, workers=1)
+    offline = replace(suite, evaluation=replace(suite.evaluation, reading="interp"))
+    again = run_suite(offline, store, workers=1)
+    assert [result.digest for result in again] == [result.digest for result in causal]
+    assert all(0.0 < result.metrics["availability"] <= 1.0 for result in again)
+    assert [r.metrics["pos_rmse"] for r in again] != [r.metrics["pos_rmse"] for r in causal]
 
 
 def test_a_key_depends_on_run_parameters_seed_and_nothing_else(suite, tmp_path):
