@@ -16,6 +16,8 @@ from fusion import SuiteError, WorldError
 from fusion.errors import did_you_mean
 from fusion.schema import read_record
 
+CATALOGUE = "catalogue"
+"""The file beside the built-in suites that tells where recordings come from."""
 CLEAN = "clean"
 """The fault that is none; every suite has it."""
 
@@ -141,8 +143,19 @@ class Suite:
         return next(run for run in self.runs if run.id == run_id)
 
 
+def builtin_suites() -> dict[str, Path]:
+    """Suites that come with the package, by name."""
+    folder = Path(__file__).parents[1] / "suites"
+    return {path.stem: path for path in sorted(folder.glob("*.toml")) if path.stem != CATALOGUE}
+
+
 def load_suite(path: Path) -> Suite:
-    """The suite in a TOML file; raises `SuiteError` that says where it is wrong."""
+    """The suite in a TOML file, or a built-in one by name; raises `SuiteError` that says where it is wrong."""
+    if not path.suffix and not path.exists():
+        known = builtin_suites()
+        if str(path) not in known:
+            raise SuiteError(f"there is no suite {str(path)!r}; {did_you_mean(str(path), known)}")
+        path = known[str(path)]
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
         written = read_record(_File, table, str(path))

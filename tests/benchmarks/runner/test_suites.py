@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.runner import definition
-from benchmarks.runner.definition import load_suite
+from benchmarks.runner.definition import builtin_suites, load_suite
 from benchmarks.runner.plan import contestant_spec, read_faults
+from fusion import SuiteError
 from logs.importing import KINDS
 from sensors.scenario import builtin_names
 
@@ -27,6 +28,13 @@ def test_suite_loads_and_names_what_exists(name):
         read_faults(faults)
     assert {run.scenario for run in suite.runs} <= {*builtin_names(), None}
     assert {run.catalogue for run in suite.runs} <= {*CATALOGUE, None}
+
+
+def test_built_in_suites_go_by_name_and_a_near_miss_is_answered():
+    assert sorted(builtin_suites()) == ["paper", "quick", "real", "synthetic"]
+    assert load_suite(Path("quick")) == load_suite(SUITES / "quick.toml")
+    with pytest.raises(SuiteError, match="did you mean 'quick'"):
+        load_suite(Path("quikc"))
 
 
 def test_suites_have_enough_runs_for_a_verdict():
