@@ -8,10 +8,9 @@ import math
 
 def at_least_one(text: str) -> int:
     """A count of runs or processes, from a command line."""
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{number} do nothing; give 1 or more")
-    return number
+    if not text.lstrip("+-").isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is no such count; give a whole number from 1 on")
+    return int(text)
 
 
 def since_start(text: str) -> float:

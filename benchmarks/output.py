@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 
 from fusion import FusionError
+
+
+def require_place(path: Path) -> None:
+    """Raises `FusionError` now for a place that `write` could not write to: before minutes of work are spent."""
+    if path == Path("-"):
+        return
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FusionError(f"{path}: cannot be written ({error.strerror}); give another place") from error
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        raise FusionError(f"{path}: cannot be written; give a file in a folder that can be written to")
 
 
 def write(path: Path, content: bytes) -> None:

@@ -26,13 +26,15 @@ def markdown(report: Report, figure_link: Callable[[str], str]) -> str:
     """The page, with figures linked to as ``figure_link`` says."""
     text = resources.files("benchmarks").joinpath("paper", "page.md").read_text(encoding="utf-8")
 
+    told = texts(report)
+
     def filled(place: re.Match[str]) -> str:
         kind, name = place.groups()
         if kind == "table":
             return as_markdown(report.sheets[name])
         if kind == "figure":
             return f"![{(FIGURES[name].__doc__ or name).splitlines()[0]}]({figure_link(name)})"
-        return texts(report)[name]
+        return told[name]
 
     return PLACE.sub(filled, text)
 

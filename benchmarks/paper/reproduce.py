@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.arguments import at_least_one
-from benchmarks.output import write_json
+from benchmarks.output import require_place, write_json
 from benchmarks.paper.calibrated import write_calibrated
 from benchmarks.paper.experiment import run_experiments
 from benchmarks.paper.page import write_html, write_markdown, write_png
@@ -54,7 +54,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--calibrate",
         type=Path,
         metavar="FOLDER",
-        help="solve for what the paper does not give, write scenarios there, and do nothing else (an hour)",
+        help="solve for what the paper does not give, write scenarios there, and do nothing else; some 20 minutes",
     )
 
 
@@ -83,12 +83,22 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _writers(arguments: argparse.Namespace) -> list[tuple[Path, Callable[[Report, Path], object]]]:
-    """What is to be written where. What figures need is looked for before minutes are spent."""
-    drawn = [(arguments.html, write_html), (arguments.png, write_png), (arguments.markdown, write_markdown)]
+Writer = Callable[[Report, Path], object]
+
+
+def _writers(arguments: argparse.Namespace) -> list[tuple[Path, Writer]]:
+    """What is to be written where. What that needs is looked for before minutes are spent."""
+    drawn: list[tuple[Path | None, Writer]] = [
+        (arguments.html, write_html),
+        (arguments.png, write_png),
+        (arguments.markdown, write_markdown),
+    ]
     if any(path for path, _ in drawn):
         require_matplotlib()
-    return [(path, writer) for path, writer in [(arguments.json, _write_json), *drawn] if path is not None]
+    wanted = [(path, writer) for path, writer in [(arguments.json, _write_json), *drawn] if path is not None]
+    for path, _ in wanted:
+        require_place(path)
+    return wanted
 
 
 def _write_json(report: Report, path: Path) -> None:

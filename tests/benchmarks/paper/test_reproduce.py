@@ -167,8 +167,7 @@ def test_command_prints_tables_and_writes_what_is_asked(report, tmp_path, monkey
     assert html.count("<table>") == html.count("</table>") > len(report.sheets)
 
 
-def test_file_that_cannot_be_written_is_told(report, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(module, "reproduce", lambda *_, **__: report)
+def test_file_that_cannot_be_written_is_told_before_any_work(tmp_path, capsys):
     assert main(["reproduce", "--json", str(tmp_path)]) == 1
     assert "cannot be written" in capsys.readouterr().err
 
