@@ -20,6 +20,8 @@ from benchmarks.sheet import print_sheets
 
 TRIALS = 200
 
+Writer = Callable[[Report, Path], object]
+
 
 def reproduce(
     trials: int = TRIALS,
@@ -81,9 +83,6 @@ def run(arguments: argparse.Namespace) -> int:
         writer(report, path)
         sys.stdout.write(f"{path}\n")
     return 0
-
-
-Writer = Callable[[Report, Path], object]
 
 
 def _writers(arguments: argparse.Namespace) -> list[tuple[Path, Writer]]:
