@@ -13,9 +13,9 @@ from typing import Any
 import fusion
 from benchmarks.arguments import at_least_one
 from benchmarks.cell import STATUSES, Cell, Score, cached_run, crashed, score_cell
+from benchmarks.metrics.score import pool
 from benchmarks.output import write_json
 from benchmarks.progress import Progress, progress_bar
-from benchmarks.score import pool
 from benchmarks.workers import Loss, compute
 from fusion import LogError, ParameterError
 from fusion.errors import did_you_mean

@@ -16,11 +16,11 @@ from typing import NamedTuple
 import numpy as np
 
 import fusion
-from benchmarks.innovations import innovation_metrics
-from benchmarks.instants import evaluation_instants, match
 from benchmarks.lane import Lane, run_lane
-from benchmarks.score import Errors, errors, for_json, metrics, quantile
-from benchmarks.track import Track
+from benchmarks.metrics.innovations import innovation_metrics
+from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.score import Errors, errors, for_json, metrics, quantile
+from benchmarks.metrics.track import Track
 from logs.reader import read_run
 from logs.run import Run
 
@@ -52,7 +52,7 @@ class Score:
 
     @cached_property
     def metrics(self) -> dict[str, float]:
-        """Metrics by id (`benchmarks.score`); empty without truth."""
+        """Metrics by id (`benchmarks.metrics.score`); empty without truth."""
         return {} if self.errors is None else metrics(self.errors)
 
     def record(self) -> dict[str, object]:

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from benchmarks.bench import bench, pooled, remarks, write_records
 from benchmarks.cell import Score
-from benchmarks.picture import render
-from benchmarks.review import review
+from benchmarks.review.picture import render
+from benchmarks.review.review import review
+from benchmarks.review.viewer import has_display, open_viewer
 from benchmarks.table import print_tables
-from benchmarks.viewer import has_display, open_viewer
 from fusion import ViewerError
 from sensors.simulate import simulate
 

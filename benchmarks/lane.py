@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import fusion
+from benchmarks.metrics.track import FateColumns, Track
 from benchmarks.prior import starting_prior
-from benchmarks.track import FateColumns, Track
 from fusion import FusionError, Update
 from logs.run import Run
 

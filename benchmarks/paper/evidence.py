@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.metrics.score import quantile
+from benchmarks.metrics.track import Floats
 from benchmarks.paper import summary
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.published import BISWAS_VELOSO, ODOMETRY, PROPOSED, TABLE_1, WIFI, ErrorRow
-from benchmarks.score import quantile
-from benchmarks.track import Floats
 
 LARGE_OUTLIER = 3.0
 """Times the median error of a run."""

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.bound import rssi_fix_bound
+from benchmarks.metrics.bound import rssi_fix_bound
+from benchmarks.metrics.track import Floats
 from benchmarks.paper.assumptions import ALTERNATIVES
 from benchmarks.paper.calibrate import SEEDS
 from benchmarks.paper.calibrated import calibrated_alternative
@@ -17,7 +18,6 @@ from benchmarks.paper.moves import r_squared
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI, Environment
 from benchmarks.paper.trial import Trial, run_alternative, run_trial
 from benchmarks.progress import Progress
-from benchmarks.track import Floats
 from benchmarks.workers import Loss, compute
 from fusion import FusionError, ParameterError
 from sensors.scenario import Scenario, load_scenario

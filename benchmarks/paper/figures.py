@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from benchmarks.metrics.score import CHI_SQUARE_95, quantile
+from benchmarks.metrics.track import Floats
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.moves import MOVES_M
 from benchmarks.paper.published import ODOMETRY, PROPOSED, WIFI
@@ -15,8 +17,6 @@ from benchmarks.paper.summary import Spread
 from benchmarks.paper.tables import CURVES, by_median
 from benchmarks.paper.weaknesses import REPAIRED, lock_out_example
 from benchmarks.plotting import label, panels, plain_colour, plain_ticks
-from benchmarks.score import CHI_SQUARE_95, quantile
-from benchmarks.track import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

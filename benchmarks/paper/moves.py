@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.track import Floats
+from benchmarks.metrics.track import Floats
 from fusion import Truth, WheelTicks
 from sensors.scenario import Scenario
 from sensors.simulated import SimulatedRobot

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 import fusion
+from benchmarks.metrics.track import Floats
 from benchmarks.paper import tables
 from benchmarks.paper.claims import Judged, judge
 from benchmarks.paper.experiment import Outcome
@@ -18,7 +19,6 @@ from benchmarks.paper.study import Ranked, effects, rank
 from benchmarks.paper.summary import Spread
 from benchmarks.paper.weaknesses import lock_out_example, origin_example
 from benchmarks.sheet import Sheet
-from benchmarks.track import Floats
 
 
 class Report(NamedTuple):

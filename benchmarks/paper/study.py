@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.metrics.track import Floats
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.published import ODOMETRY, WIFI
 from benchmarks.paper.readings import MISSING_OPTION, MISSING_VALUES, OPTIONS, READINGS, SCALE_OPTION, Reading, literal
 from benchmarks.paper.summary import Share, Spread, beats_both
-from benchmarks.track import Floats
 
 
 class Ranked(NamedTuple):

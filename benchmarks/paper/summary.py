@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.score import quantile
-from benchmarks.track import Floats
+from benchmarks.metrics.score import quantile
+from benchmarks.metrics.track import Floats
 
 LEVEL = 0.90
 """Of all intervals."""

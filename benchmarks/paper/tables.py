@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from benchmarks.metrics.track import Floats
 from benchmarks.paper.assumptions import ALTERNATIVES, MAIN
 from benchmarks.paper.claims import Judged
 from benchmarks.paper.experiment import Outcome
@@ -16,7 +17,6 @@ from benchmarks.paper.study import Effect, Ranked, literal_of_scale
 from benchmarks.paper.summary import Share, Spread, beats_both
 from benchmarks.paper.weaknesses import Leg, Moved
 from benchmarks.sheet import Sheet
-from benchmarks.track import Floats
 
 CURVES = {ODOMETRY: "odometry", WIFI: "Wi-Fi", PROPOSED: "proposed"}
 """The paper's names."""

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fusion
-from benchmarks.instants import evaluation_instants, match
 from benchmarks.lane import Lane, run_lane
+from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.track import Floats, Track
 from benchmarks.paper.moves import measured_moves
 from benchmarks.paper.published import EKF, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.readings import MISSING_OPTION, MISSING_VALUES, ORIGINS_M, READINGS, SCALE_OPTION, SCALES
 from benchmarks.paper.variants import leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
-from benchmarks.track import Floats, Track
 from fusion import Decision, WifiScan
 from logs.run import Run
 from sensors.scenario import Scenario, load_scenario

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.metrics.score import quantile
 from benchmarks.plotting import label, panels, plain_colour, plain_ticks
 from benchmarks.report.material import Material
 from benchmarks.runner.results import by_contestant, score_matrix
-from benchmarks.score import quantile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

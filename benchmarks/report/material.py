@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.instants import Answers, Instants, evaluation_instants, match
+from benchmarks.metrics.instants import Answers, Instants, evaluation_instants, match
+from benchmarks.metrics.track import Floats, from_bytes
 from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.results import RANKED_BY, Result, by_contestant, comparison, median_metrics
 from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store
 from benchmarks.runner.time_verb import read_timing
-from benchmarks.track import Floats, from_bytes
-from benchmarks.verdict import Comparison
+from benchmarks.statistics.verdict import Comparison
 from fusion import ParameterError
 from fusion.values import seconds
 from logs.run import Run

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.posterior import eff_pcrlb, posterior_bound
+from benchmarks.metrics.posterior import eff_pcrlb, posterior_bound
+from benchmarks.metrics.score import quantile
 from benchmarks.report.material import Material
 from benchmarks.report.worst import Moment, command
 from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.results import ALIVE, Result, by_contestant, median_metrics, score_matrix
-from benchmarks.score import quantile
 from benchmarks.sheet import Sheet
 from benchmarks.table import COLUMNS, as_text
 

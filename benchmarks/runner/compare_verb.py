@@ -13,7 +13,7 @@ from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.results import RANKED_BY, Result, comparison, read_results
 from benchmarks.runner.store import Store
 from benchmarks.sheet import Sheet, print_sheets
-from benchmarks.verdict import Comparison
+from benchmarks.statistics.verdict import Comparison
 from fusion import ParameterError, SuiteError
 from fusion.errors import did_you_mean
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 
-from benchmarks.instants import GAP_S, MAX_AGE_S, RATE_HZ
+from benchmarks.metrics.instants import GAP_S, MAX_AGE_S, RATE_HZ
 from fusion import SuiteError, WorldError
 from fusion.errors import did_you_mean
 from fusion.schema import read_record
@@ -24,7 +24,7 @@ CLEAN = "clean"
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """When estimates are judged: `benchmarks.instants`."""
+    """When estimates are judged: `benchmarks.metrics.instants`."""
 
     hz: float = RATE_HZ
     reading: str = "causal"
@@ -83,7 +83,7 @@ class Contestant:
 
 @dataclass(frozen=True, slots=True)
 class FaultSet:
-    """Faults applied together, as tables of `benchmarks.faults`."""
+    """Faults applied together, as tables of `benchmarks.faults.faults`."""
 
     id: str
     apply: Sequence[Mapping[str, object]] = ()

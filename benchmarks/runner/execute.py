@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.cell import status_of
-from benchmarks.faults import apply_faults
-from benchmarks.innovations import innovation_metrics
-from benchmarks.instants import evaluation_instants, match
-from benchmarks.interpolation import meet
+from benchmarks.faults.faults import apply_faults
 from benchmarks.lane import Lane, run_lane
+from benchmarks.metrics.innovations import innovation_metrics
+from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.interpolation import meet
+from benchmarks.metrics.score import errors, metrics
+from benchmarks.metrics.track import Track, from_bytes, to_bytes
 from benchmarks.runner.definition import CLEAN, CellLimits
 from benchmarks.runner.plan import Cell, read_faults
 from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store, to_json
-from benchmarks.score import errors, metrics
-from benchmarks.track import Track, from_bytes, to_bytes
 from benchmarks.workers import Limits, Loss, compute
 from logs.run import Run
 

@@ -15,15 +15,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.metrics.score import METRICS_VERSION
+from benchmarks.metrics.track import Floats
 from benchmarks.runner.definition import CLEAN, Gate, load_suite
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.results import ALIVE, Result, by_contestant, read_results, score_matrix
 from benchmarks.runner.store import Store
 from benchmarks.runner.verify_verb import differing
-from benchmarks.score import METRICS_VERSION
-from benchmarks.track import Floats
-from benchmarks.verdict import compare
+from benchmarks.statistics.verdict import compare
 from fusion import FusionError, SuiteError
 
 

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 import fusion
-from benchmarks.fault_kind import Fault
-from benchmarks.faults import read_fault
+from benchmarks.faults.fault_kind import Fault
+from benchmarks.faults.faults import read_fault
+from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.runner.definition import CLEAN, Contestant, Evaluation, FaultSet, RunSource, Suite
 from benchmarks.runner.source import Content, content_of, fingerprint
 from benchmarks.runner.store import Store, key_of
-from benchmarks.score import METRICS_VERSION
 from fusion import SuiteError
 from fusion.errors import did_you_mean
 from fusion.plugins import parameters

@@ -8,15 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.metrics.score import METRICS_VERSION, quantile
+from benchmarks.metrics.track import Floats
 from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.execute import read_metrics
 from benchmarks.runner.plan import Cell
 from benchmarks.runner.store import Store
-from benchmarks.score import METRICS_VERSION, quantile
 from benchmarks.sheet import Sheet
+from benchmarks.statistics.verdict import Comparison, compare
 from benchmarks.table import COLUMNS, as_text
-from benchmarks.track import Floats
-from benchmarks.verdict import Comparison, compare
 
 RANKED_BY = "pos_p75"
 ALIVE = ("ok", "unscored")
@@ -24,7 +24,7 @@ ALIVE = ("ok", "unscored")
 
 
 class Result(NamedTuple):
-    """One cell's score: infinite and NaN metrics are what `benchmarks.score` says they are."""
+    """One cell's score: infinite and NaN metrics are what `benchmarks.metrics.score` says they are."""
 
     cell: Cell
     status: str

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.instants import Answers, Instants, wrap_angles
+from benchmarks.metrics.instants import Answers, Instants, wrap_angles
 
 
 def _answers_of(x, y, heading, covariance=None, valid=None):

@@ -5,15 +5,15 @@ import tomllib
 import numpy as np
 import pytest
 
-from benchmarks.instants import evaluation_instants, match
 from benchmarks.lane import run_lane
+from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.score import errors as score
 from benchmarks.paper import calibrate, calibrated
 from benchmarks.paper.assumptions import ALTERNATIVES, MAIN, filled
 from benchmarks.paper.calibrate import SEEDS, Solved, Unknown, solve, unknowns
 from benchmarks.paper.calibrated import ALTERNATIVES_FILE, calibrated_alternative, calibrated_numbers, write_calibrated
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.variants import without_gyro
-from benchmarks.score import errors as score
 from fusion import FusionError, WifiScan, WorldError
 from sensors.scenario import Scenario, load_scenario, scenario_text
 from sensors.simulate import simulated_run

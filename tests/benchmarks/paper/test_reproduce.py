@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import fusion
-from benchmarks.instants import evaluation_instants, match
 from benchmarks.lane import run_lane
+from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.score import errors
 from benchmarks.paper import reproduce as module
 from benchmarks.paper.calibrate import SEEDS
 from benchmarks.paper.experiment import run_experiments
@@ -19,7 +20,6 @@ from benchmarks.paper.readings import ORIGINS_M, READINGS, literal
 from benchmarks.paper.reproduce import reproduce
 from benchmarks.paper.trial import GYRO, GYRO_LANES, run_alternative, run_trial
 from benchmarks.paper.variants import with_gyro
-from benchmarks.score import errors
 from benchmarks.sheet import as_markdown
 from fusion import ParameterError, WorldError
 from fusion.cli import main

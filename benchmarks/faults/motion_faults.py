@@ -1,0 +1,119 @@
+"""Faults of how the motion is told: wheels that slip or count nothing, a gyro that drifts, a robot carried away."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.faults.fault_kind import Fault
+from benchmarks.faults.rows import Windows
+from benchmarks.faults.tape import Tape
+from benchmarks.prior import starting_prior
+from fusion import ParameterError, Pose, wrap_angle
+
+WHEELS = {
+    "differential": ("left", "right"),
+    "skid_steer": ("front_left", "front_right", "rear_left", "rear_right"),
+    "none": (),
+}
+"""Names of the wheels of each drive, in their order (`fusion.world.DRIVES`)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Slip(Fault):
+    """A wheel is told to have rolled ``factor`` times as far as it did. ``wheel``: one by name, a side (``left``), or
+    "" for all; an increment of odometry is taken apart into its wheels and put together again.
+    """
+
+    kind: ClassVar[str] = "slip"
+    factor: float
+    wheel: str = ""
+    windows: Windows | None = None
+
+    def strike(self, tape: Tape, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
+        """Scale the roll of the wheels that are struck."""
+        struck = tape.messages.select("odom", windows=self.windows)
+        tape.roll[np.ix_(np.flatnonzero(struck), _columns(self.wheel, tape))] *= self.factor
+
+
+@dataclass(frozen=True, slots=True)
+class Freeze(Fault):
+    """A dead encoder: its wheel is told to stand still. ``wheel`` as in `Slip`."""
+
+    kind: ClassVar[str] = "freeze"
+    wheel: str = ""
+    windows: Windows | None = None
+
+    def strike(self, tape: Tape, random: np.random.Generator) -> None:
+        """Slip by nothing at all."""
+        Slip(0.0, self.wheel, self.windows).strike(tape, random)
+
+
+def _columns(wheel: str, tape: Tape) -> NDArray[np.int64]:
+    """Columns of the wheels whose names hold all words of ``wheel``."""
+    if not wheel:
+        return np.arange(tape.roll.shape[1])
+    drive = tape.run.world.robot.drive
+    found = [set(wheel.split("_")) <= set(name.split("_")) for name in WHEELS[drive]]
+    if not any(found):
+        known = ", ".join(WHEELS[drive]) or "no wheels"
+        raise ParameterError(f"the run has no wheel {wheel!r}; its {drive} drive has {known}")
+    return np.flatnonzero(found)
+
+
+@dataclass(frozen=True, slots=True)
+class GyroBias(Fault):
+    """A constant is added to the gyro's rate."""
+
+    kind: ClassVar[str] = "gyro_bias"
+    bias_deg_s: float
+    windows: Windows | None = None
+
+    def strike(self, tape: Tape, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
+        """Shift the rates."""
+        tape.rate_rad_s[tape.messages.select("gyro", windows=self.windows)] += math.radians(self.bias_deg_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Kidnap(Fault):
+    """The robot is carried off: from ``from_s`` to ``until_s`` wheels and gyro tell of no motion (a gyro at rest reads
+    the bias that the world states) and radio is silent, while the truth goes on.
+    """
+
+    kind: ClassVar[str] = "kidnap"
+    from_s: float
+    until_s: float
+
+    def __post_init__(self) -> None:
+        Fault.__post_init__(self)  # dataclasses with slots are made twice, so super() finds the wrong one
+        if self.from_s >= self.until_s:
+            raise ParameterError(f"until_s: {self.until_s} must be later than from_s, {self.from_s}")
+
+    def strike(self, tape: Tape, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
+        """Stop the wheels and the gyro, and silence the radio."""
+        carried = tape.messages.within(((self.from_s, self.until_s),))
+        tape.roll[carried] = 0.0
+        tape.rate_rad_s[carried] = tape.run.world.robot.gyro_bias_rad_s
+        tape.messages.kept[carried & np.isin(tape.messages.topic, ("wifi", "ranges"))] = False
+
+
+@dataclass(frozen=True, slots=True)
+class BadStart(Fault):
+    """The pose an estimator starts from is wrong by ``std_m`` along each axis and ``std_deg``; its covariance claims
+    what it did.
+    """
+
+    kind: ClassVar[str] = "bad_start"
+    std_m: float = 0.0
+    std_deg: float = 0.0
+
+    def strike(self, tape: Tape, random: np.random.Generator) -> None:
+        """Three draws: along x, along y, about the vertical."""
+        prior = tape.prior or starting_prior(tape.run)
+        dx, dy, turn = (random.standard_normal(3) * (self.std_m, self.std_m, math.radians(self.std_deg))).tolist()
+        pose = Pose(prior.pose.x + dx, prior.pose.y + dy, wrap_angle(prior.pose.heading + turn))
+        tape.prior = replace(prior, pose=pose)

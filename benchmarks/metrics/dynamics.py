@@ -1,0 +1,142 @@
+"""How the answers came and went: convergence, failures and recovery, silence, where on the floor there were any.
+
+A stretch of instants lasts from its first to its last one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.metrics.deviation import Errors
+from benchmarks.metrics.drift import theil_sen
+from benchmarks.metrics.quantiles import quantile
+from benchmarks.metrics.track import Flags, Whole
+from fusion.values import NANOSECONDS, nanoseconds
+
+CONVERGED_M, CONVERGED_S = 1.0, 5.0
+"""Converged: no further off than this for so long."""
+FAILED_M, FAILED_S = 3.0, 2.0
+"""Failed: further off than this, or without an answer, for so long."""
+CELL_M = 1.0
+COVERED = 0.95
+"""A cell of the floor is covered when this share of its instants has a valid answer."""
+
+
+class Stretches(NamedTuple):
+    """Index of the first and the last instant of each of k stretches, (k,)."""
+
+    first: Whole
+    last: Whole
+
+    def lasting(self, time_ns: Whole, least_s: float) -> Stretches:
+        """Those that last ``least_s`` or longer."""
+        long = time_ns[self.last] - time_ns[self.first] >= nanoseconds(least_s)
+        return Stretches(self.first[long], self.last[long])
+
+
+def stretches(mask: Flags, run: Whole) -> Stretches:
+    """The longest stretches of instants where ``mask`` (n,) is True, none reaching over two runs."""
+    if len(mask) == 0 or not mask.any():
+        return Stretches(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+    breaks = np.flatnonzero((mask[1:] != mask[:-1]) | (run[1:] != run[:-1])) + 1
+    first = np.concatenate([[0], breaks])
+    last = np.concatenate([breaks - 1, [len(mask) - 1]])
+    kept = mask[first]
+    return Stretches(first[kept], last[kept])
+
+
+def dynamic_metrics(measured: Errors) -> dict[str, float]:
+    """All of this module; NaN without instants."""
+    return {**convergence_metrics(measured), **failure_metrics(measured), **silence_metrics(measured)}
+
+
+def convergence_metrics(measured: Errors) -> dict[str, float]:
+    """``t_conv`` [s] from the first instant of a run to when it has converged, ``t_conv_share`` of the runs that do.
+
+    Over several runs the Kaplan-Meier median; infinite when half of them never do before they end.
+    """
+    held = stretches(measured.position <= CONVERGED_M, measured.run).lasting(measured.time_ns, CONVERGED_S)
+    runs = stretches(np.ones(len(measured.run), dtype=bool), measured.run)
+    times, reached = [], []
+    for start, end in zip(runs.first.tolist(), runs.last.tolist(), strict=True):
+        own = held.first[(held.first >= start) & (held.first <= end)]
+        stop = own[0] if len(own) else end
+        times.append(float(measured.time_ns[stop] - measured.time_ns[start]) / NANOSECONDS)
+        reached.append(len(own) > 0)
+    share = sum(reached) / len(reached) if reached else math.nan
+    return {"t_conv": kaplan_meier_median(times, reached), "t_conv_share": share}
+
+
+def kaplan_meier_median(times: list[float], reached: list[bool]) -> float:
+    """The time by which half have reached their end, those not ``reached`` being watched only up to theirs.
+
+    Kaplan & Meier 1958; infinite when the estimated share left never falls to one half, NaN of nothing.
+    """
+    if not times:
+        return math.nan
+    left = 1.0
+    for time in sorted(set(times)):
+        watched = sum(other >= time for other in times)
+        ended = sum(done and other == time for other, done in zip(times, reached, strict=True))
+        left *= 1.0 - ended / watched
+        if left <= 0.5:
+            return time
+    return math.inf
+
+
+def failure_metrics(measured: Errors, outages: Stretches | None = None) -> dict[str, float]:
+    """Failures, and the worst of ``outages`` (None: of the failures themselves): ``t_recover`` [s] from its end until
+    converged again, infinite if never; ``max_in_outage`` [m], the greatest error of a valid answer inside it;
+    ``growth`` [m/s], the Theil-Sen slope of the error inside it. NaN where there was none.
+    """
+    failed = stretches(measured.position > FAILED_M, measured.run).lasting(measured.time_ns, FAILED_S)
+    events = failed if outages is None else outages
+    known = [_outage(measured, first, last) for first, last in zip(*map(np.ndarray.tolist, events), strict=True)]
+    worst = [max((x for x in column if not math.isnan(x)), default=math.nan) for column in zip(*known, strict=True)]
+    names = ("t_recover", "max_in_outage", "growth")
+    return {"failures": float(len(failed.first)), **dict(zip(names, worst or [math.nan] * 3, strict=True))}
+
+
+def _outage(measured: Errors, first: int, last: int) -> tuple[float, float, float]:
+    inside = measured.position[first : last + 1]
+    valid = np.isfinite(inside)
+    seconds = (measured.time_ns[first : last + 1][valid] - measured.time_ns[first]) / NANOSECONDS
+    peak = float(inside[valid].max()) if valid.any() else math.nan
+    rest = measured._replace(**{name: column[last + 1 :] for name, column in measured._asdict().items()})
+    rest_of_run = rest.position[rest.run == measured.run[last]]
+    rest_ns = rest.time_ns[: len(rest_of_run)]
+    held = stretches(rest_of_run <= CONVERGED_M, rest.run[: len(rest_of_run)]).lasting(rest_ns, CONVERGED_S)
+    recovered = (rest_ns[held.first[0]] - measured.time_ns[last]) / NANOSECONDS if len(held.first) else math.inf
+    return float(recovered), peak, theil_sen(seconds, inside[valid])
+
+
+def silence_metrics(measured: Errors) -> dict[str, float]:
+    """``age_p95`` [s] of the newest answer; ``dropouts``: stretches without a valid answer, and ``dropout_s``, how
+    long all of them last, each up to the next answer; ``coverage``: share of the 1 m² cells of the floor the truth
+    visits that are covered.
+    """
+    count = len(measured.position)
+    if count == 0:
+        return dict.fromkeys(("age_p95", "dropouts", "dropout_s", "coverage"), math.nan)
+    valid = np.isfinite(measured.position)
+    silent = stretches(~valid, measured.run)
+    after = np.minimum(silent.last + 1, count - 1)
+    after = np.where(measured.run[after] == measured.run[silent.last], after, silent.last)
+    return {
+        "age_p95": quantile(measured.age_s, 0.95),
+        "dropouts": float(len(silent.first)),
+        "dropout_s": float((measured.time_ns[after] - measured.time_ns[silent.first]).sum()) / NANOSECONDS,
+        "coverage": _coverage(measured, valid),
+    }
+
+
+def _coverage(measured: Errors, valid: Flags) -> float:
+    if valid.all():
+        return 1.0
+    column, row = np.floor(measured.x / CELL_M), np.floor(measured.y / CELL_M)
+    _, cell = np.unique(column + 1j * row, return_inverse=True)
+    answered = np.bincount(cell, weights=valid) / np.bincount(cell)
+    return float(np.count_nonzero(answered >= COVERED) / len(answered))

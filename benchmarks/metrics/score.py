@@ -1,0 +1,61 @@
+"""How good the answers were: all metrics by id, each a pure function of arrays, in metres, seconds and radians.
+
+Coverage is part of the score. An instant without a valid answer counts as an infinite error in every quantile;
+means and root mean squares cover the valid instants only and never rank alone. Nothing is aligned.
+`docs/benchmark.md` lists the ids.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from benchmarks.metrics.consistency import CHI_SQUARE_95, consistency_metrics, distribution_metrics
+from benchmarks.metrics.deviation import Errors, errors, pool
+from benchmarks.metrics.drift import drift_metrics
+from benchmarks.metrics.dynamics import dynamic_metrics
+from benchmarks.metrics.position import axis_metrics, heading_metrics, position_metrics, track_metrics
+from benchmarks.metrics.quantiles import quantile
+from benchmarks.metrics.trajectory import trajectory_metrics
+
+METRICS_VERSION = 2
+"""Changes whenever a metric does, so that stored scores are not taken for current ones."""
+
+__all__ = [
+    "CHI_SQUARE_95",
+    "METRICS_VERSION",
+    "Errors",
+    "absolute_metrics",
+    "errors",
+    "for_json",
+    "metrics",
+    "pool",
+    "quantile",
+]
+
+
+def metrics(measured: Errors) -> dict[str, float]:
+    """All metrics by id, in m and rad; shares in [0, 1]. NaN where nothing can be said, infinite where most is lost."""
+    return {
+        **absolute_metrics(measured),
+        **trajectory_metrics(measured),
+        **drift_metrics(measured),
+        **consistency_metrics(measured),
+        **distribution_metrics(measured),
+        **dynamic_metrics(measured),
+    }
+
+
+def absolute_metrics(measured: Errors) -> dict[str, float]:
+    """Those of position and heading alone, which are all that alignment changes."""
+    return {
+        **position_metrics(measured),
+        **axis_metrics(measured),
+        **track_metrics(measured),
+        **heading_metrics(measured),
+    }
+
+
+def for_json(scores: Mapping[str, float]) -> dict[str, float | None]:
+    """JSON knows neither infinity nor NaN: both become None."""
+    return {key: value if math.isfinite(value) else None for key, value in scores.items()}

@@ -1,0 +1,70 @@
+"""What a review shows whatever the estimator: the floor, the true path, the readings as they came."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from benchmarks.colours import ANCHOR, TRUTH, WALL, anchor_colour
+from benchmarks.review.canvas import Canvas
+from benchmarks.review.cdf import CdfAxes, draw_axes
+from benchmarks.review.frame import Frame
+from benchmarks.review.heard import Heard
+from benchmarks.review.paths import draw_path
+from benchmarks.review.raw_sensors import draw_raw_sensors, raw_series
+from fusion import World
+from logs.run import Run, TruthTrack
+
+
+def draw_base(canvas: Canvas, run: Run, readings: Heard, axes: CdfAxes | None, legend: tuple[float, float]) -> None:
+    """The base layer; ``axes``: of the error distribution, None without truth; ``legend``: the truth's place in it."""
+    _draw_floor(canvas, run.world)
+    if run.truth is not None:
+        canvas.label(["map", "legend", "truth"], "truth", TRUTH, legend)
+        _draw_truth(canvas, run.truth)
+    _draw_readings(canvas, run.world, readings)
+    draw_raw_sensors(canvas, raw_series(run.world, run.measurements))
+    if axes is not None:
+        draw_axes(canvas, axes)
+
+
+def properties(run: Run, frame: Frame) -> dict[str, Any]:
+    """What the viewer tells of the recording when it is selected."""
+    return {
+        "log": str(run.path),
+        "world": run.world.name,
+        "world_hash": run.world.hash,
+        "start_ns": frame.start_ns,
+        "duration_s": frame.duration_s,
+        "measurements": len(run.measurements),
+        "warnings": list(run.warnings) or ["none"],
+    }
+
+
+def _draw_floor(canvas: Canvas, world: World) -> None:
+    """Walls and anchors. The map is mirrored into the view, so that y points up."""
+    rr, bounds = canvas.rr, world.bounds
+    canvas.style(["map"], rr.Transform3D(mat3x3=np.diag([1.0, -1.0, 1.0])))
+    low, high = (bounds.x_min, bounds.y_min), (bounds.x_max, bounds.y_max)
+    border = [low, (high[0], low[1]), high, (low[0], high[1]), low]
+    walls = [list(wall) for wall in world.walls]
+    radii = [-1.0] + [-2.0] * len(walls)
+    canvas.style(["map", "walls"], rr.LineStrips2D([border, *walls], colors=[WALL], radii=radii, draw_order=-20))
+    for anchor in world.anchors:
+        canvas.label(["map", "anchor", anchor.id], anchor.id, ANCHOR, (anchor.x, anchor.y))
+
+
+def _draw_truth(canvas: Canvas, truth: TruthTrack) -> None:
+    known = np.flatnonzero(np.isfinite(truth.x) & np.isfinite(truth.y))
+    xy = np.column_stack([truth.x, truth.y])[known]
+    draw_path(canvas, ["map", "truth"], TRUTH, truth.time_ns[known], xy)
+
+
+def _draw_readings(canvas: Canvas, world: World, readings: Heard) -> None:
+    """Signal strengths [dBm] and ranges [m] as they came, one series per anchor."""
+    for kind, chosen in (("rssi", ~readings.is_range), ("ranges", readings.is_range)):
+        for anchor in np.unique(readings.anchor[chosen]).tolist():
+            own = chosen & (readings.anchor == anchor)
+            colour = anchor_colour(world, anchor)
+            canvas.dots([kind, anchor], anchor, colour, readings.time_ns[own], readings.value[own])

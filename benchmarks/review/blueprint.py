@@ -1,0 +1,130 @@
+"""The layout of a review, so that nobody has to click: pages, and on the first the map on the left, what went wrong
+and why on the right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.metrics.score import quantile
+from benchmarks.review.drawing import SHOWN, Drawing
+from benchmarks.review.estimator_plots import AXES
+from benchmarks.review.events import State
+from benchmarks.review.frame import TIMELINE, Frame
+from benchmarks.review.raw_sensors import SPEED, TURN_RATE
+from benchmarks.review.views import cdf_view, event_view, map_view, plot, score_view, state_view, table_view, tabs
+from fusion import Ranges, WifiScan
+from logs.run import Run
+
+NIS_SHOWN = 12.0
+"""Top of the NIS plot: three times the 95 % limit."""
+NEES_SHOWN = 30.0
+"""Least top of the NEES plot: three times the upper bound."""
+
+
+def blueprint(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401 - Rerun's own value
+    """The layout for the lanes ``drawn``, the best first."""
+    import rerun.blueprint as rrb
+
+    pages = [_overview(frame, run, drawn), _readings(frame, run, drawn), _motion(frame)]
+    pages += [rrb.Vertical(table_view(drawn), name="Table")] if run.truth is not None else []
+    return rrb.Blueprint(
+        rrb.Tabs(*pages, active_tab=0),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="paused"),
+        collapse_panels=True,
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _overview(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
+    import rerun.blueprint as rrb
+
+    has_truth = run.truth is not None
+    scores = rrb.Horizontal(score_view(), cdf_view(drawn), column_shares=[3, 2]) if has_truth else score_view()
+    left = rrb.Vertical(map_view(frame, run, drawn), scores, row_shares=[2, 1])
+    # More names than that hide the plot; the map's own legend stands beside it.
+    titles = {"Position error (m)": "/error", "Heading error (°)": "/heading_error"}
+    errors = [plot(frame, title, origin, legend=len(drawn) <= SHOWN) for title, origin in titles.items()]
+    details = _details(frame, drawn)
+    right = [(tabs(errors), 2.0)] if has_truth else []
+    right += [_reception(frame, run, drawn)]
+    right += [(tabs(details), 3.6)] if details else []
+    views, shares = zip(*right, strict=True)
+    return rrb.Horizontal(left, rrb.Vertical(*views, row_shares=shares), column_shares=[3, 2], name="Overview")
+
+
+def _reception(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> tuple[Any, float]:
+    """What the radio said and what was made of it, and their height; in front is what has something to tell."""
+    told = [drawing for drawing in drawn if drawing.shown and not drawing.ghost and drawing.states.state]
+    lanes = [state_view(frame, told)] if told else []
+    eventful = any(state in (State.REJECT, State.LOST) for drawing in told for state in drawing.states.state)
+    if eventful:
+        return tabs(lanes + _radio(frame, run)), max(1.5, 0.6 + 0.28 * len(told))
+    return tabs(_radio(frame, run) + lanes), 1.8
+
+
+def _radio(frame: Frame, run: Run) -> list[Any]:
+    """A plot for each kind of radio reading the run holds."""
+    kinds = {type(measurement) for measurement in run.measurements}
+    plots = [plot(frame, "Ranges (m)", "/ranges")] if Ranges in kinds else []
+    if WifiScan in kinds or not plots:
+        plots.append(plot(frame, "Signal strength (dBm)", "/rssi"))
+    return plots
+
+
+def _details(frame: Frame, drawn: Sequence[Drawing]) -> list[Any]:
+    """A tab for each estimator: does its error fit its claim, and what happened to it?"""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    details = []
+    for drawing in (drawing for drawing in drawn if not drawing.ghost):
+        name, views = drawing.name, []
+        if any(drawing.claims):
+            place = ["consistency", name]
+            axes = [
+                (f"{axis.name} error and ±1σ ({axis.unit})", rr.new_entity_path([*place, axis.name])) for axis in AXES
+            ]
+            nees = f"{name}: NEES; 95 % should lie between the lines"
+            views += [tabs([plot(frame, title, origin, legend=False) for title, origin in axes])]
+            views += [plot(frame, nees, rr.new_entity_path(["nees", name]), top=_nees_top(drawing), legend=False)]
+        views += [event_view(name)] if drawing.events.text else []
+        if views:
+            details.append(rrb.Vertical(*views, name=name))
+    return details
+
+
+def _nees_top(drawing: Drawing) -> float:
+    """High enough for nine tenths of a filter's NEES, and for its bounds."""
+    errors = drawing.score.errors
+    nees = np.array([]) if errors is None else errors.nees[np.isfinite(errors.nees)]
+    return max(NEES_SHOWN, quantile(nees, 0.9)) if len(nees) else NEES_SHOWN
+
+
+def _readings(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
+    """The radio in full: what was read, and how far each estimator believed it."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    gates = []
+    for drawing in (drawing for drawing in drawn if drawing.gates):
+        name = drawing.name
+        weight = f"{name}: weight of readings, coloured as above"
+        views = [plot(frame, weight, rr.new_entity_path(["weight", name]), top=1.0, legend=False)]
+        if drawing.tells_nis:
+            nis = f"{name}: NIS of readings; the line is exceeded once in twenty"
+            views.append(plot(frame, nis, rr.new_entity_path(["nis", name]), top=NIS_SHOWN, legend=False))
+        gates.append(rrb.Vertical(*views, name=name))
+    return rrb.Vertical(*_radio(frame, run), *([tabs(gates)] if gates else []), name="Radio")
+
+
+def _motion(frame: Frame) -> Any:  # noqa: ANN401
+    """The motion sensors as they came."""
+    import rerun.blueprint as rrb
+
+    speeds = plot(frame, "Speed (m/s)", f"/raw/{SPEED}")
+    return rrb.Vertical(speeds, plot(frame, "Turn rate (°/s)", f"/raw/{TURN_RATE}"), name="Motion")

@@ -1,0 +1,87 @@
+"""Where a review is drawn: one Rerun recording, written in whole columns.
+
+A row sent alone costs two hundred times more than a row in a column; only what holds at all times is logged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.colours import Colour
+from benchmarks.metrics.track import Floats, Stamps
+from benchmarks.review.frame import TIMELINE
+
+MOST_POSES = 6000
+"""Poses of one drawn track: more cost the viewer time and show nothing. Scores are never thinned."""
+FAINT, STRONG = 80, 255
+"""Opacity of whole tracks and of what is at the time cursor."""
+
+Place = Sequence[str]
+"""An entity's place in the recording, part by part: a part may hold any character."""
+Rows = TypeVar("Rows", NDArray[np.int64], Floats)
+
+
+class Canvas(NamedTuple):
+    """The Rerun module, its recording, and the time that counts as zero."""
+
+    rr: Any
+    recording: Any
+    start_ns: int
+
+    def style(self, path: Place, *archetypes: Any) -> None:  # noqa: ANN401 - Rerun's own values
+        """What holds at all times."""
+        self.recording.log(self.rr.new_entity_path(list(path)), *archetypes, static=True)
+
+    def columns(self, path: Place, time_ns: Stamps, *columns: Any) -> None:  # noqa: ANN401
+        """One row per time [ns]."""
+        index = self.rr.TimeColumn(TIMELINE, duration=(time_ns - self.start_ns).astype("timedelta64[ns]"))
+        for column in columns:
+            self.recording.send_columns(self.rr.new_entity_path(list(path)), [index], column)
+
+    def dots(self, path: Place, name: str, colour: Colour, time_ns: Stamps, values: Floats) -> None:
+        """A dot per (time [ns], value)."""
+        look = self.rr.SeriesPoints.from_fields(names=[name], colors=[colour], marker_sizes=[2.0])
+        self._series(path, look, time_ns, values)
+
+    def line(
+        self,
+        path: Place,
+        name: str,
+        colour: Colour,
+        time_ns: Stamps,
+        values: Floats,
+        *,
+        width: float = 1.5,
+        shown: bool = True,
+        merge: str = "MinMaxAverage",
+    ) -> None:
+        """A line through (time [ns], value), broken where a value is not finite; not shown: off in the legend.
+
+        ``merge``: what the viewer makes of rows that share a pixel. Its own choice, their mean, hides the worst.
+        """
+        look: dict[str, Any] = {"names": [name], "colors": [colour], "widths": [width], "visible_series": [shown]}
+        look["aggregation_policy"] = getattr(self.rr.components.AggregationPolicy, merge)
+        self._series(path, self.rr.SeriesLines.from_fields(**look), time_ns, values)
+
+    def _series(self, path: Place, look: Any, time_ns: Stamps, values: Floats) -> None:  # noqa: ANN401
+        finite = np.isfinite(values)
+        if finite.any():
+            self.style(path, look)
+            self.columns(path, time_ns, self.rr.Scalars.columns(scalars=np.where(finite, values, np.nan)))
+
+    def label(
+        self, path: Place, text: str, colour: Colour, place: tuple[float, float], *, radius: float = -6.0
+    ) -> None:
+        """A labelled dot at all times; negative radii are pixels."""
+        look = {"colors": [colour], "radii": [radius], "labels": [text], "show_labels": True}
+        self.style(path, self.rr.Points2D([place], **look))
+
+
+def thinned(rows: Rows) -> Rows:
+    """Every n-th of ``rows``, at most `MOST_POSES` of them."""
+    return rows[:: max(math.ceil(len(rows) / MOST_POSES), 1)]

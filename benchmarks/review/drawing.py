@@ -1,0 +1,130 @@
+"""One lane as it is drawn: everything it said turned into columns once, and its errors at the evaluation instants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.cell import Score
+from benchmarks.colours import Colour, colour_of
+from benchmarks.lane import Lane
+from benchmarks.metrics.instants import Answers, Instants, evaluation_instants, match, wrap_angles
+from benchmarks.metrics.track import Floats
+from benchmarks.review.columns import DrawnFates, DrawnTrack, EstimateColumns
+from benchmarks.review.events import Events, States, events, states
+from benchmarks.table import ranked
+from fusion import Reason
+from logs.run import Run
+
+SHOWN = 6
+"""Tracks that are switched on, the best ones: more cannot be told apart. The eye beside an entity shows the others."""
+
+
+class SignedErrors(NamedTuple):
+    """Estimate minus truth, x, y and heading (n, 3) [m, m, rad], and what is claimed of its variance (n, 3); NaN where
+    there is no valid answer, or no claim.
+    """
+
+    error: Floats
+    variance: Floats
+
+
+def signed_errors(instants: Instants, answers: Answers) -> SignedErrors:
+    """Of ``answers``, which belong to ``instants`` one by one."""
+    turn = wrap_angles(answers.heading - instants.heading)
+    error = np.column_stack([answers.x - instants.x, answers.y - instants.y, turn])
+    variance = np.diagonal(answers.covariance, axis1=1, axis2=2)
+    known = answers.valid[:, None] & np.isfinite(error)
+    return SignedErrors(np.where(known, error, np.nan), np.where(known & np.isfinite(variance), variance, np.nan))
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A lane with its score. ``instants`` and ``answers`` belong together; they are
+    None where there is nothing to compare: no truth, or a lane that crashed.
+    """
+
+    lane: Lane
+    score: Score
+    shown: bool
+    instants: Instants | None
+    answers: Answers | None
+
+    @property
+    def name(self) -> str:
+        """The lane's name."""
+        return self.lane.name
+
+    @property
+    def ghost(self) -> bool:
+        """Whether it shows what would have been, and is drawn thin."""
+        return self.lane.ghost_of is not None
+
+    @property
+    def colour(self) -> Colour:
+        """A ghost has the colour of what it is a ghost of."""
+        return colour_of(self.lane.ghost_of or self.lane.name)
+
+    @cached_property
+    def track(self) -> DrawnTrack:
+        """The path."""
+        return DrawnTrack.of_updates(self.lane.final, self.estimates.valid)
+
+    @cached_property
+    def estimates(self) -> EstimateColumns:
+        """What it said of itself."""
+        return EstimateColumns.of_updates(self.lane.final)
+
+    @cached_property
+    def fates(self) -> DrawnFates:
+        """What became of the readings; of a ghost's nothing is shown."""
+        return DrawnFates.of_updates(() if self.ghost else self.lane.final)
+
+    @cached_property
+    def states(self) -> States:
+        """When its state changed."""
+        return states(self.estimates, self.fates)
+
+    @cached_property
+    def events(self) -> Events:
+        """What happened to it."""
+        return events(self.lane.final, self.estimates, self.fates)
+
+    @cached_property
+    def gates(self) -> bool:
+        """Whether it listens to the radio at all, so that there is a weight to show."""
+        return not bool(self.fates.of(Reason.KIND_NOT_CONSUMED).all())
+
+    @cached_property
+    def tells_nis(self) -> bool:
+        """Whether any reading has an NIS."""
+        return bool(np.isfinite(self.fates.nis).any())
+
+    @cached_property
+    def errors(self) -> SignedErrors | None:
+        """Its errors and what it claims of them."""
+        return None if self.instants is None or self.answers is None else signed_errors(self.instants, self.answers)
+
+    @cached_property
+    def claims(self) -> list[bool]:
+        """Whether it ever claims a variance of x, y and heading."""
+        return [False] * 3 if self.errors is None else [bool(np.isfinite(v).any()) for v in self.errors.variance.T]
+
+
+def drawings(run: Run, lanes: Sequence[Lane], scores: Sequence[Score]) -> list[Drawing]:
+    """The lanes with their scores, one by one, the best first. A ghost is shown where its estimator is."""
+    instants = None if run.truth is None else evaluation_instants(run.truth)
+    by_name = {lane.name: lane for lane in lanes}
+    ranking = [(by_name[score.estimator], score) for score in ranked(scores)]
+    best = [lane.name for lane, _ in ranking if lane.ghost_of is None][:SHOWN]
+    drawn = []
+    for lane, score in ranking:
+        shown = (lane.ghost_of or lane.name) in best
+        compared = instants if score.errors is not None and lane.error is None else None
+        answers = None if compared is None else match(compared, lane.track)
+        drawn.append(Drawing(lane, score, shown, compared, answers))
+    return drawn

@@ -1,0 +1,105 @@
+"""One estimator on the map: its path, where it is and how sure, how far off, and which readings put it there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.colours import ANCHOR, REFUSED
+from benchmarks.metrics.score import CHI_SQUARE_95
+from benchmarks.metrics.track import Floats
+from benchmarks.review.canvas import STRONG, Canvas, Place, thinned
+from benchmarks.review.drawing import Drawing
+from benchmarks.review.heard import Heard
+from benchmarks.review.paths import draw_path
+from fusion import Reason, World
+
+CIRCLE_OPACITY = 130
+GHOST_THICKNESS = 0.5
+"""Of the lines of what would have been, against those of what was."""
+
+
+def thickness(drawing: Drawing) -> float:
+    """How thick a lane is drawn."""
+    return GHOST_THICKNESS if drawing.ghost else 1.0
+
+
+def draw_on_map(canvas: Canvas, world: World, readings: Heard, drawing: Drawing, legend: tuple[float, float]) -> None:
+    """The lane's part of the map; ``legend``: its place in the legend."""
+    place = ["map", "estimate", drawing.name]
+    text = drawing.name if drawing.shown else f"{drawing.name} (hidden)"
+    canvas.label(["map", "legend", drawing.name], text, drawing.colour, legend, radius=-6.0 * thickness(drawing))
+    draw_path(canvas, place, drawing.colour, *drawing.track[:2], thickness=thickness(drawing))
+    _draw_error_line(canvas, [*place, "error"], drawing)
+    if not drawing.ghost:
+        _draw_ellipses(canvas, [*place, "covariance"], drawing)
+        _draw_circles(canvas, [*place, "readings"], world, readings, drawing)
+
+
+def _draw_ellipses(canvas: Canvas, place: Place, drawing: Drawing) -> None:
+    """The 95 % region of each position that claims a covariance: its half axes are the roots of the covariance's
+    eigenvalues times the chi-square value of two degrees.
+    """
+    claimed = np.isfinite(drawing.track.covariance).all(axis=1)
+    if not claimed.any():
+        return
+    track = drawing.track
+    time_ns, xy, covariance = track.time_ns[claimed], track.xy[claimed], track.covariance[claimed]
+    eigenvalues, axes = np.linalg.eigh(covariance[:, [0, 1, 1, 3]].reshape(-1, 2, 2))
+    half_angle = 0.5 * np.arctan2(axes[:, 1, 0], axes[:, 0, 0])
+    none = np.zeros_like(half_angle)
+    quaternion_xyzw = np.column_stack([none, none, np.sin(half_angle), np.cos(half_angle)])
+    rr, half_sizes = canvas.rr, np.sqrt(np.maximum(eigenvalues, 0.0) * CHI_SQUARE_95[2])
+    canvas.style(place, rr.Ellipses2D.from_fields(colors=[(*drawing.colour, STRONG)], line_radii=[-1.0]))
+    canvas.columns(
+        place,
+        time_ns,
+        rr.Transform3D.columns(translation=np.column_stack([xy, none]), quaternion=quaternion_xyzw),
+        rr.Ellipses2D.columns(half_sizes=half_sizes),
+    )
+
+
+def _draw_error_line(canvas: Canvas, place: Place, drawing: Drawing) -> None:
+    """From the estimate to the truth at that time; no line while there is no valid answer."""
+    if drawing.instants is None or drawing.answers is None:
+        return
+    chosen = thinned(np.arange(len(drawing.instants.time_ns)))
+    valid = drawing.answers.valid[chosen]
+    if not valid.any():
+        return
+    answer, truth = (np.column_stack([at.x, at.y])[chosen][valid] for at in (drawing.answers, drawing.instants))
+    strips = np.stack([answer, truth], axis=1)
+    look = {"colors": [(*drawing.colour, STRONG)], "radii": [-0.75 * thickness(drawing)]}
+    canvas.style(place, canvas.rr.LineStrips2D.from_fields(**look))
+    rows = canvas.rr.LineStrips2D.columns(strips=strips).partition(valid.astype(np.int64))
+    canvas.columns(place, drawing.instants.time_ns[chosen], rows)
+
+
+def _draw_circles(canvas: Canvas, place: Place, world: World, readings: Heard, drawing: Drawing) -> None:
+    """Where each reading of the last update puts the robot, a circle around its anchor: in the anchor's yellow
+    when the estimator believed it wholly, vermillion when not at all.
+    """
+    fates, rr = drawing.fates, canvas.rr
+    asked = ~fates.of(Reason.KIND_NOT_CONSUMED)
+    radius_m = np.array([readings.radius_of.get(fate[:4], np.nan) for fate in fates.fates], dtype=np.float64)
+    drawn = asked & np.isfinite(radius_m)
+    if not drawn.any():
+        return
+    # An update none of whose readings makes a circle still takes away those of the one before.
+    updates, first = np.unique(fates.update[asked], return_index=True)
+    lengths = np.bincount(np.searchsorted(updates, fates.update[drawn]), minlength=len(updates))
+    position = {anchor.id: (anchor.x, anchor.y) for anchor in world.anchors}
+    circles = {
+        "centers": np.array([position[name] for name in fates.name[drawn].tolist()]),
+        "half_sizes": np.repeat(radius_m[drawn, None], 2, axis=1),
+        "colors": weight_colours(fates.weight[drawn]),
+    }
+    canvas.style(place, rr.Ellipses2D.from_fields(line_radii=[-0.75]))
+    canvas.columns(place, fates.time_ns[asked][first], rr.Ellipses2D.columns(**circles).partition(lengths))
+
+
+def weight_colours(weights: Floats) -> NDArray[np.uint8]:
+    """RGBA (n, 4) between vermillion (weight 0) and the yellow of anchors (weight 1)."""
+    share = np.clip(weights, 0.0, 1.0)[:, None]
+    rgb = (1.0 - share) * np.array(REFUSED) + share * np.array(ANCHOR)
+    return np.column_stack([rgb, np.full(len(weights), CIRCLE_OPACITY)]).round().astype(np.uint8)

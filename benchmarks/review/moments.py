@@ -1,0 +1,173 @@
+"""The worst moments of an estimator, and what its readings were like just before: where to look first."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.metrics.instants import MAX_AGE_S
+from benchmarks.metrics.track import Floats, Stamps
+from benchmarks.review.columns import MEMBERS, DrawnFates, Flags
+from benchmarks.review.drawing import Drawing
+from benchmarks.review.events import OWN_REFUSALS
+from fusion import Decision, Odometry, Reason, WheelTicks
+from fusion.values import nanoseconds, seconds
+from logs.run import Run
+
+SPACING_S = 5.0
+"""Moments closer together are one."""
+JUST_BEFORE_S = 5.0
+"""How far back a cause is looked for."""
+SILENCE_S = 2.0
+"""A shorter gap in the readings is nothing unusual."""
+ENOUGH_ANCHORS = 3
+"""A position in the plane needs so many distances."""
+TOGETHER_S = 1.0
+"""Readings this close together count as one view of the anchors."""
+SURPRISING_NIS = 9.0
+"""Three standard deviations: a reading so far off that was believed all the same."""
+
+
+class Moment(NamedTuple):
+    """A local maximum of the position error [m], infinite where there was no valid answer, ``at_s`` after the run's
+    start, with what was unusual just before.
+    """
+
+    estimator: str
+    at_s: float
+    error_m: float
+    causes: tuple[str, ...]
+
+    def command(self, run: Path, seed: int = 0) -> str:
+        """The command line that opens the review there."""
+        words = ["fusion", "review", str(run), "--estimators", self.estimator, "--at", f"{self.at_s:.2f}"]
+        return shlex.join(words + (["--seed", str(seed)] if seed else []))
+
+
+def worst_moments(run: Run, drawing: Drawing, start_ns: int, count: int) -> list[Moment]:
+    """The ``count`` worst moments of a lane, the worst first; none where nothing is judged."""
+    if drawing.instants is None or drawing.score.errors is None:
+        return []
+    time_ns, errors_m = drawing.instants.time_ns, drawing.score.errors.position
+    moments = []
+    for place in peaks(time_ns, errors_m, count):
+        at_ns = int(time_ns[place])
+        causes = tuple(_causes(run, drawing, at_ns)) or ("nothing unusual in the readings",)
+        moments.append(Moment(drawing.name, seconds(at_ns - start_ns), float(errors_m[place]), causes))
+    return moments
+
+
+def peaks(time_ns: Stamps, values: Floats, count: int) -> list[int]:
+    """Indices of the ``count`` largest local maxima at least `SPACING_S` apart, the largest first, of equal ones the
+    earliest; a plateau counts as its first row.
+    """
+    if len(values) == 0:
+        return []
+    starts = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
+    level = values[starts]
+    above_left = np.concatenate([[True], level[1:] > level[:-1]])
+    above_right = np.concatenate([level[:-1] > level[1:], [True]])
+    chosen: list[int] = []
+    candidates = starts[above_left & above_right]
+    for place in candidates[np.argsort(-values[candidates], kind="stable")].tolist():
+        if all(abs(int(time_ns[place]) - int(time_ns[other])) >= nanoseconds(SPACING_S) for other in chosen):
+            chosen.append(place)
+        if len(chosen) == count:
+            break
+    return chosen
+
+
+def _causes(run: Run, drawing: Drawing, at_ns: int) -> Iterator[str]:
+    """What was unusual just before ``at_ns``, in words."""
+    yield from _of_estimates(drawing, at_ns)
+    if drawing.gates:
+        yield from _of_reception(drawing.fates, at_ns)
+        yield from _of_judgement(drawing.fates, at_ns)
+    else:
+        yield "uses no radio"
+    yield from _of_motion(run, at_ns)
+
+
+def _of_estimates(drawing: Drawing, at_ns: int) -> Iterator[str]:
+    said = drawing.estimates
+    last = int(np.searchsorted(said.time_ns, at_ns, side="right")) - 1
+    if last < 0:
+        yield "no estimate yet"
+        return
+    if at_ns - said.time_ns[last] > nanoseconds(MAX_AGE_S):
+        yield f"no estimate for {_length(at_ns - int(said.time_ns[last]))}"
+    elif not said.valid[last]:
+        yield "no valid position"
+    first = int(np.searchsorted(said.time_ns, at_ns - nanoseconds(JUST_BEFORE_S), side="right"))
+    resets = int(said.reset_count[last] - said.reset_count[min(first, last)])
+    if resets > 0:
+        yield f"belief replaced {resets} times" if resets > 1 else "belief replaced"
+
+
+def _of_reception(fates: DrawnFates, at_ns: int) -> Iterator[str]:
+    """Silence, or too few anchors at once: of what the host let through."""
+    heard = fates.of(Decision.USED, Decision.DOWNWEIGHTED, Decision.REJECTED) | fates.of(*OWN_REFUSALS)
+    time_ns, names = fates.time_ns[heard], fates.name[heard]
+    end = int(np.searchsorted(time_ns, at_ns, side="right"))
+    if end == 0:
+        yield "no radio yet"
+        return
+    if at_ns - time_ns[end - 1] > nanoseconds(SILENCE_S):
+        yield f"no radio for {_length(at_ns - int(time_ns[end - 1]))}"
+        return
+    since_ns = _last_view(time_ns[:end].tolist(), names[:end].tolist())
+    if since_ns is None or at_ns - since_ns > nanoseconds(SILENCE_S):
+        length = "so far" if since_ns is None else f"for {_length(at_ns - since_ns)}"
+        yield f"fewer than {ENOUGH_ANCHORS} anchors {length}"
+
+
+def _last_view(time_ns: list[int], names: list[str]) -> int | None:
+    """The last time [ns] at which enough anchors had been heard within `TOGETHER_S`, None: never."""
+    within, start = Counter[str](), len(names)
+    for end in range(len(names) - 1, -1, -1):
+        while start > 0 and time_ns[start - 1] > time_ns[end] - nanoseconds(TOGETHER_S):
+            start -= 1
+            within[names[start]] += 1
+        if len(+within) >= ENOUGH_ANCHORS:
+            return time_ns[end]
+        within[names[end]] -= 1
+    return None
+
+
+def _of_judgement(fates: DrawnFates, at_ns: int) -> Iterator[str]:
+    """What became of the readings just before."""
+    recent = (fates.time_ns <= at_ns) & (fates.time_ns > at_ns - nanoseconds(JUST_BEFORE_S))
+    recent &= ~fates.of(Reason.KIND_NOT_CONSUMED)
+    total = int(recent.sum())
+    for decision in (Decision.REJECTED, Decision.DOWNWEIGHTED, Decision.LATE, Decision.UNUSABLE):
+        own = recent & fates.of(decision)
+        # One reading in two: an outlier here and there is what a gate is for.
+        if own.sum() * 2 >= max(total, 1):
+            yield f"{own.sum()} of {total} readings {decision.value} ({_reasons(fates, own)})"
+    taken = np.flatnonzero(recent & fates.of(Decision.USED) & (fates.nis > SURPRISING_NIS))
+    if len(taken):
+        worst = taken[np.argmax(fates.nis[taken])]
+        yield f"{fates.name[worst]} taken with NIS {fates.nis[worst]:.1f}"
+
+
+def _reasons(fates: DrawnFates, chosen: Flags) -> str:
+    return ", ".join(sorted({MEMBERS[code].value.replace("_", " ") for code in fates.reason[chosen].tolist()}))
+
+
+def _of_motion(run: Run, at_ns: int) -> Iterator[str]:
+    stamps = [m.time_ns for m in run.measurements if isinstance(m, WheelTicks | Odometry) and m.time_ns <= at_ns]
+    if not stamps:
+        yield "no odometry yet"
+    elif at_ns - max(stamps) > nanoseconds(SILENCE_S):
+        yield f"no odometry for {_length(at_ns - max(stamps))}"
+
+
+def _length(duration_ns: int) -> str:
+    duration_s = seconds(duration_ns)
+    return f"{duration_s:.0f} s" if duration_s >= 10.0 else f"{math.floor(10.0 * duration_s) / 10.0:g} s"

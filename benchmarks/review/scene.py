@@ -1,0 +1,105 @@
+"""A run and its estimators as Rerun files: a base layer of what belongs to the run, and a layer for each estimator.
+
+All layers name the same application and recording, so the viewer shows those it is given as one recording: `rerun
+base.rrd ekf.rrd`. Nothing but drawing happens here: the numbers are those of the bench.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from benchmarks.cell import Score
+from benchmarks.lane import Lane
+from benchmarks.review.base_layer import draw_base, properties
+from benchmarks.review.blueprint import blueprint
+from benchmarks.review.canvas import Canvas
+from benchmarks.review.cdf import CdfAxes, draw_curve
+from benchmarks.review.drawing import Drawing, drawings
+from benchmarks.review.estimator_layer import draw_on_map, thickness
+from benchmarks.review.estimator_plots import draw_over_time
+from benchmarks.review.frame import Frame
+from benchmarks.review.heard import heard
+from benchmarks.review.viewer import require_rerun
+from benchmarks.table import COLUMNS, as_text, ranked
+from fusion import FusionError
+from logs.run import Run
+
+APPLICATION = "fusion"
+SUFFIX = ".rrd"
+
+
+def write_scene(output: Path, run: Run, lanes: Sequence[Lane], scores: Sequence[Score]) -> list[Path]:
+    """Write the review of ``run``, which brings its own layout; ``scores`` are those of ``lanes``.
+
+    ``output``: one file when its name ends in ``.rrd``, else a folder for ``base.rrd`` and a file for each lane.
+    Answers the files, which are to be opened together. Raises `ViewerError` where Rerun is not installed,
+    `FusionError` where a file cannot be written.
+    """
+    rr = require_rerun()
+    base, layers = files(output, [lane.name for lane in lanes])
+    frame, drawn, readings = Frame.around(run), drawings(run, lanes, scores), heard(run.world, run.measurements)
+    axes, legend = _axes(drawn), frame.legend(1 + len(drawn))
+    identity = f"{run.name} {run.world.hash[:12]}"
+    with _recording(base, identity, default_blueprint=blueprint(frame, run, drawn)) as recording:
+        recording.send_recording_name(run.name)
+        recording.send_property("run", rr.AnyValues(**properties(run, frame)))
+        canvas = Canvas(rr, recording, frame.start_ns)
+        draw_base(canvas, run, readings, axes, legend[0])
+        canvas.style(["scores"], rr.TextDocument(markdown(scores), media_type="text/markdown"))
+        for drawing, place in zip(drawn, legend[1:], strict=True):
+            with _recording(layers[drawing.name], identity) if layers else nullcontext(recording) as own:
+                layer = canvas._replace(recording=own)
+                draw_on_map(layer, run.world, readings, drawing, place)
+                draw_over_time(layer, run.world, frame, drawing)
+                if axes is not None:
+                    draw_curve(layer, drawing, axes, thickness(drawing))
+    return [base, *layers.values()]
+
+
+def files(output: Path, lanes: Sequence[str]) -> tuple[Path, Mapping[str, Path]]:
+    """The file of the base layer, and those of the lanes by name: none where all is in one file."""
+    if output.suffix == SUFFIX:
+        return output, {}
+    # A name may hold what a file system cannot: "ekf without 02:00:5e:00".
+    return output / f"base{SUFFIX}", {name: output / f"{quote(name, safe=' ')}{SUFFIX}" for name in lanes}
+
+
+@contextmanager
+def _recording(output: Path, identity: str, **sink: Any) -> Iterator[Any]:  # noqa: ANN401 - Rerun's own values
+    """A recording that is written into the file ``output``; the one with the layout alone carries the properties."""
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        output.touch()
+    except OSError as error:
+        raise FusionError(f"{output}: the review cannot be written ({error.strerror}); give another place") from error
+    rr = require_rerun()
+    recording = rr.RecordingStream(APPLICATION, recording_id=identity, send_properties=bool(sink))
+    recording.save(output, **sink)
+    try:
+        yield recording
+    finally:
+        recording.flush()
+        recording.disconnect()
+
+
+def _axes(drawn: Sequence[Drawing]) -> CdfAxes | None:
+    """Axes for the estimators that are shown; None without truth."""
+    errors = [drawing.score.errors.position for drawing in drawn if drawing.shown and drawing.score.errors is not None]
+    return CdfAxes.around(errors) if errors else None
+
+
+def markdown(scores: Sequence[Score]) -> str:
+    """The score table, the best first, and why an estimator is missing from it; the view's name tells the units."""
+    titles = ["estimator", *(column.title.partition("\n")[0] for column in COLUMNS)]
+    lines = ["| " + " | ".join(titles) + " |", "|---" * len(titles) + "|"]
+    for score in ranked(scores):
+        values = {**score.facts, **score.metrics}
+        remark = "" if score.status in ("ok", "unscored") else f" ({score.status})"
+        cells = [score.estimator + remark, *(as_text(column, values) for column in COLUMNS)]
+        lines.append("| " + " | ".join(cells) + " |")
+    crashes = [f"\n{score.estimator} crashed: {score.error}" for score in scores if score.error is not None]
+    return "\n".join([*lines, *crashes]) + "\n"

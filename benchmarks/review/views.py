@@ -1,0 +1,154 @@
+"""The single views of a review, each with its background and its whole range given: the viewer's own guesses differ
+between desktop and web.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from benchmarks.colours import GROUND
+from benchmarks.review.cdf import WIDTH
+from benchmarks.review.drawing import Drawing
+from benchmarks.review.frame import LEGEND, TIMELINE, Frame
+from logs.run import Run
+
+TRAIL_S = 10.0
+"""How far back the strong part of a track goes."""
+MARGIN = 0.06
+"""Free space around the floor, as a share of its width."""
+
+
+def tabs(views: Sequence[Any]) -> Any:  # noqa: ANN401 - Rerun's own values, here and below
+    """Views behind each other, the first in front; a single one needs no tab."""
+    import rerun.blueprint as rrb
+
+    return views[0] if len(views) == 1 else rrb.Tabs(contents=views, active_tab=0)
+
+
+def map_view(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
+    """The floor from above with all tracks."""
+    import rerun.blueprint as rrb
+
+    width, margin = frame.x_max - frame.x_min, MARGIN * (frame.x_max - frame.x_min)
+    # Rerun's 2D views look down their y axis: the map is mirrored into them, and so are its bounds.
+    bounds = rrb.VisualBounds2D(
+        x_range=[frame.x_min - margin, frame.x_max + LEGEND * width],
+        y_range=[-frame.y_max - margin, -frame.y_min + margin],
+    )
+    return rrb.Spatial2DView(
+        name=f"{run.name}: tracks (m, y up), 95 % ellipses",
+        origin="/",
+        contents="/map/**",
+        background=list(GROUND),
+        visual_bounds=bounds,
+        overrides=_overrides(drawn),
+    )
+
+
+def _overrides(drawn: Sequence[Drawing]) -> dict[Any, Any]:
+    """Trails reach back from the cursor; tracks beyond the best are off, and so are all circles but the first's."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    now = rrb.TimeRangeBoundary.cursor_relative
+    trail = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(TIMELINE, start=now(seconds=-TRAIL_S), end=now(seconds=0.0))])
+    hidden = rrb.EntityBehavior(visible=False)
+    overrides: dict[Any, Any] = {rr.new_entity_path(["map", "truth", "trail"]): trail}
+    circles = next((drawing.name for drawing in drawn if drawing.gates), None)
+    for drawing in drawn:
+        place = ["map", "estimate", drawing.name]
+        overrides[rr.new_entity_path([*place, "trail"])] = trail
+        if not drawing.shown:
+            overrides[rr.new_entity_path(place)] = hidden
+        if drawing.name != circles:
+            overrides[rr.new_entity_path([*place, "readings"])] = hidden
+    return overrides
+
+
+def score_view() -> Any:  # noqa: ANN401
+    """The score table."""
+    import rerun.blueprint as rrb
+
+    return rrb.TextDocumentView(name="Scores, the best first (cm, °, %, µs a message)", origin="/scores")
+
+
+def cdf_view(drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
+    """The distribution of errors."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    hidden = rrb.EntityBehavior(visible=False)
+    off: dict[Any, Any] = {
+        rr.new_entity_path(["cdf", "estimate", drawing.name]): hidden for drawing in drawn if not drawing.shown
+    }
+    return rrb.Spatial2DView(
+        name="Share of instants with at most this error",
+        origin="/",
+        contents="/cdf/**",
+        background=list(GROUND),
+        visual_bounds=rrb.VisualBounds2D(x_range=[-0.2, WIDTH + 0.1], y_range=[-1.06, 0.16]),
+        overrides=off,
+    )
+
+
+def _whole_run(frame: Frame) -> Any:  # noqa: ANN401
+    """All of the run, not only half a minute around the cursor."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    edge = rrb.TimeRangeBoundary.absolute
+    whole = rr.TimeRange(start=edge(seconds=0.0), end=edge(seconds=max(frame.duration_s, 1.0)))
+    return rrb.TimeAxis(view_range=whole)
+
+
+def plot(frame: Frame, name: str, origin: str, *, top: float | None = None, legend: bool = True) -> Any:  # noqa: ANN401
+    """A plot of the whole run; ``top``: its values are in [0, top]."""
+    import rerun.blueprint as rrb
+    from rerun.blueprint.archetypes import PlotBackground
+
+    return rrb.TimeSeriesView(
+        name=name,
+        origin=origin,
+        axis_x=_whole_run(frame),
+        axis_y=None if top is None else rrb.ScalarAxis(range=(-0.04 * top, 1.04 * top)),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        background=PlotBackground(color=list(GROUND)),
+    )
+
+
+def state_view(frame: Frame, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
+    """A lane for each estimator, coloured by its state."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    return rrb.StateTimelineView(
+        name="Was the last scan taken?",
+        origin="/state",
+        contents=[rr.new_entity_path(["state", drawing.name]) for drawing in drawn],
+        time_view=_whole_run(frame),
+    )
+
+
+def table_view(drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
+    """The position errors as numbers."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    columns: list[Any] = [TIMELINE]
+    for drawing in (drawing for drawing in drawn if drawing.instants is not None):
+        place = rr.new_entity_path(["error", drawing.name])
+        columns.append(rrb.components.ComponentColumnSelector(entity_path=place, component="Scalars:scalars"))
+    query = rrb.archetypes.DataframeQuery(timeline=TIMELINE, select=columns)
+    return rrb.DataframeView(name="Position error (m)", origin="/", contents="/error/**", query=query)
+
+
+def event_view(name: str) -> Any:  # noqa: ANN401
+    """What happened to one estimator, line by line."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    # The time stands in the text: its own column is drawn too narrow to be read.
+    no_time = rrb.encodings.TimelineColumn(TIMELINE, visible=False)
+    columns = rrb.TextLogColumns(timeline_columns=[no_time], text_log_columns=["loglevel", "body"])
+    return rrb.TextLogView(name=f"{name}: events", origin=rr.new_entity_path(["events", name]), columns=columns)

@@ -1,0 +1,154 @@
+"""Convergence, failures, silence and drift on errors made for the purpose."""
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.metrics.deviation import errors, pool
+from benchmarks.metrics.drift import MOST_PAIRS, drift_metrics, pairs_of, theil_sen
+from benchmarks.metrics.dynamics import (
+    Stretches,
+    convergence_metrics,
+    failure_metrics,
+    kaplan_meier_median,
+    silence_metrics,
+    stretches,
+)
+
+
+@pytest.fixture
+def off_by(instants_of, answers_of):
+    """Errors of a robot that stands in one cell, at 10 Hz unless told; infinite: no valid answer."""
+
+    def measured(position, *, period_s=0.1, x=0.5, **columns):
+        position = np.asarray(position, dtype=float)
+        n = len(position)
+        place, none = np.broadcast_to(np.asarray(x, dtype=float), n), np.zeros(n)
+        instants = instants_of(period_s * np.arange(n), place, none + 0.5, none)
+        answers = answers_of(place + position, none + 0.5, none, valid=np.isfinite(position))
+        return errors(instants, answers._replace(**columns))
+
+    return measured
+
+
+def test_stretches_end_where_a_run_ends():
+    mask = np.array([True, True, False, True, True, True])
+    found = stretches(mask, np.array([0, 0, 0, 0, 1, 1]))
+    assert found.first.tolist() == [0, 3, 4]
+    assert found.last.tolist() == [1, 3, 5]
+    assert len(stretches(mask & False, np.zeros(6)).first) == 0
+
+
+def test_convergence_is_the_first_time_below_a_metre_for_five_seconds(off_by):
+    position = np.full(200, 2.0)
+    position[10:40] = 0.5
+    position[100:] = 0.5
+    assert convergence_metrics(off_by(position)) == {"t_conv": 10.0, "t_conv_share": 1.0}
+
+
+def test_run_that_ends_before_five_seconds_are_over_has_not_converged(off_by):
+    position = np.full(100, 2.0)
+    position[51:] = 0.5
+    assert convergence_metrics(off_by(position)) == {"t_conv": math.inf, "t_conv_share": 0.0}
+
+
+def test_convergence_over_runs_is_the_median_of_kaplan_and_meier(off_by):
+    runs = [np.concatenate([np.full(k, 2.0), np.full(60, 0.1)]) for k in (10, 20, 40)] + [np.full(15, 2.0)]
+    scores = convergence_metrics(pool([off_by(position) for position in runs]))
+    # After 1.0 s three of four are left, after 2.0 s half of those: the run censored at 1.4 s counts no more.
+    assert scores == {"t_conv": 2.0, "t_conv_share": 0.75}
+
+
+def test_kaplan_meier_median_without_an_end_is_infinite():
+    assert kaplan_meier_median([1.0, 2.0], [False, False]) == math.inf
+    assert kaplan_meier_median([1.0, 2.0, 3.0], [True, True, True]) == 2.0
+    assert math.isnan(kaplan_meier_median([], []))
+
+
+def test_failure_is_told_with_its_peak_growth_and_recovery(off_by):
+    position = np.full(300, 0.5)
+    position[100:150] = 3.5 + 0.02 * np.arange(50)
+    position[150:180] = 2.0
+    scores = failure_metrics(off_by(position))
+    assert scores["failures"] == 1.0
+    assert scores["max_in_outage"] == pytest.approx(3.5 + 0.02 * 49)
+    assert scores["growth"] == pytest.approx(0.2)
+    assert scores["t_recover"] == pytest.approx(3.1)
+
+
+def test_short_excursion_is_no_failure(off_by):
+    position = np.full(300, 0.5)
+    position[100:115] = 9.0
+    scores = failure_metrics(off_by(position))
+    assert scores["failures"] == 0.0
+    assert all(math.isnan(scores[name]) for name in ("t_recover", "max_in_outage", "growth"))
+
+
+def test_silence_is_a_failure_that_has_no_peak(off_by):
+    scores = failure_metrics(off_by(np.concatenate([np.full(100, 0.5), np.full(100, math.inf)])))
+    assert scores["failures"] == 1.0
+    assert scores["t_recover"] == math.inf
+    assert math.isnan(scores["max_in_outage"])
+
+
+def test_recovery_is_sought_in_the_same_run_only(off_by):
+    fails, good = off_by(np.full(100, 5.0)), off_by(np.full(100, 0.1))
+    assert failure_metrics(pool([fails, good]))["t_recover"] == math.inf
+    assert failure_metrics(pool([good, fails, good]))["t_recover"] == math.inf
+
+
+def test_outages_may_be_given_instead_of_failures(off_by):
+    position = np.full(200, 0.2)
+    position[50:100] = 0.2 + 0.01 * np.arange(50)
+    scores = failure_metrics(off_by(position), Stretches(np.array([50]), np.array([99])))
+    assert scores["failures"] == 0.0
+    assert scores["growth"] == pytest.approx(0.1)
+    assert scores["t_recover"] == pytest.approx(0.1)
+
+
+def test_silence_is_counted_and_timed_up_to_the_next_answer(off_by):
+    position = np.full(100, 0.2)
+    position[10:15] = position[95:] = math.inf
+    scores = silence_metrics(off_by(position, age_s=np.linspace(0.0, 1.0, 100)))
+    assert scores["dropouts"] == 2.0
+    assert scores["dropout_s"] == pytest.approx(0.5 + 0.4)
+    assert scores["age_p95"] == pytest.approx(0.95)
+
+
+def test_coverage_counts_cells_of_the_floor_and_not_instants(off_by):
+    position = np.full(100, 0.2)
+    position[91:] = math.inf
+    x = np.concatenate([np.full(90, 0.5), np.full(10, 1.5)])
+    assert silence_metrics(off_by(position, x=x))["coverage"] == 0.5
+    assert silence_metrics(off_by(position))["coverage"] == 0.0
+    assert silence_metrics(off_by(np.full(100, 0.2)))["coverage"] == 1.0
+
+
+def test_drift_since_the_last_fix_is_the_slope_of_the_error(off_by):
+    since = np.arange(1000) % 50 / 10.0
+    position = 0.3 + 0.07 * since
+    position[::9] += 5.0
+    measured = off_by(position, since_fix_s=since)
+    assert drift_metrics(measured)["eag"] == pytest.approx(0.07, abs=1e-3)
+
+
+def test_nothing_known_of_fixes_means_no_drift(off_by):
+    assert math.isnan(drift_metrics(off_by(np.full(10, 0.1)))["eag"])
+
+
+def test_slope_of_a_few_points_is_the_median_over_all_pairs():
+    at, values = np.array([0.0, 1.0, 1.0, 3.0, 6.0]), np.array([0.0, 1.0, 5.0, 2.0, 8.0])
+    pairs = [(i, j) for j in range(5) for i in range(j) if at[i] != at[j]]
+    slopes = [(values[j] - values[i]) / (at[j] - at[i]) for i, j in pairs]
+    assert theil_sen(at, values) == pytest.approx(np.median(slopes), rel=1e-12)
+    assert math.isnan(theil_sen(np.zeros(4), np.arange(4.0)))
+    assert math.isnan(theil_sen(np.zeros(0), np.zeros(0)))
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 77, 1000, 100_001])
+def test_pairs_are_few_enough_different_and_in_order(count):
+    first, second = pairs_of(count)
+    assert len(set(zip(first.tolist(), second.tolist(), strict=True))) == len(first)
+    assert len(first) == count * (count - 1) // 2 if count <= 77 else MOST_PAIRS // 2 < len(first) <= MOST_PAIRS
+    assert ((first >= 0) & (first < second) & (second < max(count, 1))).all()

@@ -1,0 +1,158 @@
+"""Instants belong to the truth, matching is causal."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.track import Track
+from fusion import Covariance, Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, Update
+from logs.run import TruthTrack
+
+SECOND = 1_000_000_000
+
+
+def truth_at(stamps_ns, x=None, heading=None):
+    n = len(stamps_ns)
+    return TruthTrack(
+        np.array(stamps_ns, dtype=np.int64),
+        np.arange(n, dtype=float) if x is None else np.array(x, dtype=float),
+        np.zeros(n),
+        np.zeros(n) if heading is None else np.array(heading, dtype=float),
+    )
+
+
+def update_at(time_ns, x=0.0, *, stamp_ns=None, fates=(), **claims):
+    estimate = Estimate(time_ns if stamp_ns is None else stamp_ns, Pose(x, 0.0, 0.0), None, **claims)
+    return Update(Odometry(time_ns, "wheels", time_ns, time_ns - 1, 0.0, 0.0), estimate, fates)
+
+
+def test_slow_truth_is_taken_at_its_own_stamps():
+    stamps = [0, SECOND, 2 * SECOND, 9 * SECOND]
+    assert evaluation_instants(truth_at(stamps)).time_ns.tolist() == stamps
+
+
+def test_fast_truth_is_resampled_at_ten_hertz_and_never_extrapolated():
+    stamps = np.arange(0, SECOND + 1, SECOND // 100) + 7
+    instants = evaluation_instants(truth_at(stamps))
+    assert instants.time_ns.tolist() == [7 + k * SECOND // 10 for k in range(11)]
+    np.testing.assert_allclose(instants.x, np.arange(11) * 10.0, rtol=1e-12)
+
+
+def test_instants_inside_a_long_gap_of_fast_truth_are_left_out():
+    before = np.arange(0, SECOND + 1, SECOND // 20)
+    after = before + 3 * SECOND
+    instants = evaluation_instants(truth_at(np.concatenate([before, after])))
+    inside = (instants.time_ns > SECOND) & (instants.time_ns < 3 * SECOND)
+    assert not inside.any()
+    assert len(instants.time_ns) == 22
+
+
+def test_heading_is_interpolated_along_the_shortest_arc():
+    stamps = np.array([0, 40, 80, 120, 160, 200]) * 1_000_000
+    instants = evaluation_instants(truth_at(stamps, heading=[3.1, 3.1, 3.1, -3.1, -3.1, -3.1]))
+    assert abs(instants.heading[1]) == pytest.approx(math.pi, rel=1e-12)
+
+
+def test_unknown_heading_of_a_neighbour_does_not_spoil_a_known_one():
+    instants = evaluation_instants(truth_at(np.arange(3) * SECOND // 10, heading=[0.5, math.nan, 0.7]))
+    np.testing.assert_array_equal(instants.heading, [0.5, math.nan, 0.7])
+
+
+def test_truth_that_is_nowhere_finite_gives_no_instants():
+    assert len(evaluation_instants(truth_at([0, 1], x=[math.nan, math.inf])).time_ns) == 0
+
+
+def test_an_answer_of_exactly_the_greatest_age_is_valid_and_a_nanosecond_more_is_not():
+    instants = evaluation_instants(truth_at([SECOND, SECOND + 1]), hz=1e9)
+    assert match(instants, Track.of([update_at(0)])).valid.tolist() == [True, False]
+
+
+def test_no_answer_comes_from_the_future():
+    instants = evaluation_instants(truth_at([0, SECOND]))
+    answers = match(instants, Track.of([update_at(1, 5.0), update_at(SECOND, 6.0), update_at(SECOND + 1, 7.0)]))
+    assert answers.valid.tolist() == [False, True]
+    assert answers.x[1] == 6.0
+
+
+def test_an_answer_about_the_past_counts_only_once_it_was_received():
+    instants = evaluation_instants(truth_at([SECOND, 2 * SECOND]))
+    answers = match(instants, Track.of([update_at(2 * SECOND, 5.0, stamp_ns=SECOND)]))
+    assert answers.valid.tolist() == [False, True]
+
+
+def test_a_late_message_replaces_the_newest_answer_only_by_its_revision():
+    instants = evaluation_instants(truth_at([10, 20]), hz=1e9)
+    late = [update_at(10, 1.0), update_at(5, 2.0), update_at(10, 3.0)._replace(revised=True)]
+    assert match(instants, Track.of(late)).x.tolist() == [3.0, 3.0]
+
+
+def test_a_refused_clock_does_not_move_the_time_of_reception():
+    bad = Fate(SECOND * 10**6, "wheels", 0, "", Decision.UNUSABLE, Reason.BAD_CLOCK, 0.0)
+    updates = [update_at(10), update_at(SECOND * 10**6, stamp_ns=10, fates=(bad,)), update_at(20)]
+    assert Track.of(updates).received_ns.tolist() == [10, 10, 20]
+
+
+def test_answers_not_claimed_or_not_finite_are_not_valid():
+    instants = evaluation_instants(truth_at([10]))
+    assert not match(instants, Track.of([update_at(10, math.nan)])).valid[0]
+    assert not match(instants, Track.of([update_at(10, valid=False)])).valid[0]
+    assert not match(instants, Track.of([])).valid[0]
+    assert math.isnan(match(instants, Track.of([update_at(10, heading_known=False)])).heading[0])
+
+
+def test_age_is_that_of_the_newest_answer_and_infinite_before_the_first():
+    instants = evaluation_instants(truth_at([0, SECOND, 3 * SECOND]))
+    answers = match(instants, Track.of([update_at(SECOND // 2), update_at(SECOND, stamp_ns=3 * SECOND // 4)]))
+    assert answers.age_s.tolist() == [math.inf, 0.25, 2.25]
+    assert match(instants, Track.of([])).age_s.tolist() == [math.inf] * 3
+
+
+def ranges_at(time_ns, decision, weight):
+    fate = Fate(time_ns, "uwb", time_ns, "a", decision, Reason.OK, weight)
+    return update_at(time_ns, fates=(fate,))._replace(
+        measurement=Ranges(time_ns, "uwb", time_ns, (RangeReading("a", 1.0),))
+    )
+
+
+def test_time_since_the_last_fix_counts_from_radio_that_was_believed():
+    instants = evaluation_instants(truth_at([0, 2 * SECOND, 4 * SECOND, 6 * SECOND, 8 * SECOND]))
+    gyro = Fate(7 * SECOND, "gyro", 0, "", Decision.USED, Reason.OK, 1.0)
+    updates = [
+        ranges_at(SECOND, Decision.USED, 1.0),
+        ranges_at(3 * SECOND, Decision.REJECTED, 0.0),
+        ranges_at(5 * SECOND, Decision.DOWNWEIGHTED, 0.3),
+        update_at(7 * SECOND, fates=(gyro,)),
+    ]
+    since = match(instants, Track.of(updates)).since_fix_s
+    np.testing.assert_array_equal(since, [math.nan, 1.0, 3.0, 1.0, 3.0])
+    assert np.isnan(match(instants, Track.of(updates[1:2])).since_fix_s).all()
+
+
+def test_track_alone_is_matched_as_its_updates_were():
+    claimed = Covariance(1.0, 0.1, 0.2, 2.0, 0.3, 3.0)
+    updates = [update_at(k * SECOND, float(k)) for k in (0, 1, 1, 3)]
+    updates[1] = updates[1]._replace(estimate=updates[1].estimate._replace(covariance=claimed, valid=False))
+    instants = evaluation_instants(truth_at(np.arange(-1, 6) * SECOND))
+    by_updates = match(instants, Track.of(updates))
+    by_track = match(instants, Track.of_estimates([update.estimate for update in updates]))
+    for column, other in zip(by_updates, by_track, strict=True):
+        np.testing.assert_array_equal(column, other)
+    np.testing.assert_array_equal(Track.of_estimates([updates[1].estimate]).covariance_matrices[0], claimed.matrix)
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(st.lists(st.integers(0, 40), min_size=1, max_size=20), st.lists(st.integers(0, 50), min_size=1, unique=True))
+def test_matching_agrees_with_its_definition(arrivals, asked):
+    updates = [update_at(time_ns, float(i)) for i, time_ns in enumerate(arrivals)]
+    instants = evaluation_instants(truth_at(sorted(asked)), hz=1e9)
+    answers = match(instants, Track.of(updates), max_age_s=10e-9)
+    for t, valid, x in zip(instants.time_ns, answers.valid, answers.x, strict=True):
+        received = [u for i, u in enumerate(updates) if max(arrivals[: i + 1]) <= t]
+        newest = max(received, key=lambda u: (u.estimate.time_ns, u.estimate.pose.x), default=None)
+        assert valid == (newest is not None and t - newest.estimate.time_ns <= 10)
+        if newest is not None:
+            assert x == newest.estimate.pose.x

@@ -1,0 +1,89 @@
+"""What it costs to write the review of a long run: a synthetic one, its estimates made up beforehand.
+
+Run it from the top folder: ``python tests/benchmarks/review/long_review.py [POSES] [ESTIMATORS]``.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+import fusion
+from benchmarks.cell import Cell, score_lane
+from benchmarks.lane import Lane
+from benchmarks.review.scene import write_scene
+from fusion import (
+    Covariance,
+    Decision,
+    Estimate,
+    Fate,
+    Odometry,
+    Pose,
+    RangeReading,
+    Ranges,
+    Reason,
+    Truth,
+    Update,
+)
+from logs.run import Run, TruthTrack
+
+RATE_HZ = 50
+STEPS_PER_SCAN = 10
+ANCHORS = [("a", 0.0, 0.0), ("b", 20.0, 0.0), ("c", 20.0, 15.0), ("d", 0.0, 15.0)]
+WORLD = fusion.World.from_table(
+    {"name": "hall", "anchors": [{"id": name, "position_m": [x, y]} for name, x, y in ANCHORS]}
+)
+
+
+def long_run(poses: int) -> Run:
+    """Circles in a hall: odometry and truth 50 times a second, ranges to four anchors 5 times a second."""
+    step_ns = 1_000_000_000 // RATE_HZ
+    truths, measurements = [], []
+    for k in range(1, poses + 1):
+        now, angle = k * step_ns, 0.1 * k / RATE_HZ
+        truths.append(Truth(now, 10.0 + 5.0 * np.cos(angle), 7.0 + 5.0 * np.sin(angle), angle))
+        measurements.append(Odometry(now, "wheels", k, now - step_ns, 0.5 / RATE_HZ, 0.1 / RATE_HZ))
+        if k % STEPS_PER_SCAN == 0:
+            x, y = truths[-1].x, truths[-1].y
+            readings = (RangeReading(name, float(np.hypot(x - ax, y - ay))) for name, ax, ay in ANCHORS)
+            measurements.append(Ranges(now, "uwb", k, tuple(readings)))
+    return Run(Path("long.mcap"), "long", WORLD, None, {}, tuple(measurements), TruthTrack.from_truths(truths), (), {})
+
+
+def made_up_lane(run: Run, number: int) -> Lane:
+    """Half a metre beside the truth; every twentieth reading is rejected."""
+    covariance, updates = Covariance(0.25, 0.05, 0.0, 0.25, 0.0, 0.01), []
+    for k, measurement in enumerate(run.measurements):
+        angle = 0.1 * measurement.time_ns / 1e9
+        pose = Pose(10.5 + 5.0 * np.cos(angle), 7.0 + 5.0 * np.sin(angle), float(fusion.wrap_angle(angle)))
+        fates = ()
+        if isinstance(measurement, Ranges):
+            head = measurement.time_ns, measurement.sensor, measurement.seq
+            good, bad = (Decision.USED, Reason.OK, 1.0), (Decision.REJECTED, Reason.GATE, 0.0)
+            told = [bad if (k + i) % 20 == 0 else good for i in range(len(ANCHORS))]
+            nis = 0.5 + (k % 7)
+            fates = tuple(
+                Fate(*head, r.anchor, *what, 0.1, 0.04, nis) for r, what in zip(measurement.readings, told, strict=True)
+            )
+        updates.append(Update(measurement, Estimate(measurement.time_ns, pose, covariance), fates))
+    return Lane(f"estimator {number}", tuple(updates), "", 0.0, None)
+
+
+def cost_s(poses: int, estimators: int, output: Path) -> float:
+    """Processor seconds of the writing alone."""
+    run = long_run(poses)
+    lanes = [made_up_lane(run, number) for number in range(estimators)]
+    scores = [score_lane(Cell(run.path, lane.name, {}, 0), run, lane) for lane in lanes]
+    started_s = time.process_time()
+    write_scene(output, run, lanes, scores)
+    return time.process_time() - started_s
+
+
+if __name__ == "__main__":
+    poses, estimators = (int(word) for word in (*sys.argv[1:], *("100000", "8")[len(sys.argv) - 1 :]))
+    with tempfile.TemporaryDirectory() as folder:
+        scene = Path(folder, "long.rrd")
+        sys.stdout.write(f"{poses} poses, {estimators} estimators: {cost_s(poses, estimators, scene):.2f} CPU s, ")
+        sys.stdout.write(f"{scene.stat().st_size / 1e6:.1f} MB\n")

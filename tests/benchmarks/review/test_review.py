@@ -1,0 +1,89 @@
+"""The command line of the review, as far as nothing needs to be looked at."""
+
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks.review.review import review
+from fusion import ParameterError
+from fusion.cli import main
+from sensors.simulate import simulate
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    return simulate("office", tmp_path_factory.mktemp("review") / "run.mcap", duration_s=30.0)
+
+
+def told(capsys, *words):
+    code = main(["review", *map(str, words)])
+    return code, *capsys.readouterr()
+
+
+def test_worst_moments_are_listed_with_a_command_that_opens_them_and_need_no_rerun(log, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    code, out, _ = told(capsys, log, "--estimators", "ekf,dead_reckoning", "--worst", "2")
+    lines = out.splitlines()
+    assert code == 0
+    assert len(lines) == 8
+    assert all(line.startswith(f"    fusion review {log} --estimators ") for line in lines[1::2])
+    assert sum(line.endswith("; uses no radio") for line in lines[::2]) == 2
+
+
+def test_worst_moment_is_the_largest_error_of_the_scores(log):
+    made = review(log, estimators=["ekf"], worst=3)
+    errors = [moment.error_m for moment in made.moments]
+    assert errors == sorted(errors, reverse=True)
+    assert made.files == []
+
+
+def test_layers_and_ghosts_are_written_and_named(log, tmp_path, capsys):
+    pytest.importorskip("rerun", reason="needs the extra `review`")
+    folder = tmp_path / "layers"
+    code, out, _ = told(capsys, log, "--estimators", "ekf", "--save", folder, "--without", "ap1", "--reject", "10")
+    assert code == 0
+    names = ["base.rrd", "ekf.rrd", "ekf without ap1.rrd", "ekf reject 9.98 s.rrd"]
+    assert out.splitlines() == [str(folder / name) for name in names]
+    assert all((folder / name).stat().st_size > 10_000 for name in names)
+
+
+def test_misspelt_anchor_is_refused_before_anything_is_written(log, tmp_path, capsys):
+    pytest.importorskip("rerun", reason="needs the extra `review`")
+    code, _, err = told(capsys, log, "--save", tmp_path / "r.rrd", "--without", "ap11")
+    assert (code, list(tmp_path.iterdir())) == (1, [])
+    assert "did you mean 'ap1'?" in err
+
+
+def test_web_refuses_a_folder_of_layers_and_says_what_it_takes(log, tmp_path, capsys):
+    code, _, err = told(capsys, log, "--web", "--save", tmp_path / "layers")
+    assert code == 1
+    assert f"give --save {tmp_path / 'layers'}.rrd" in err
+
+
+@pytest.mark.parametrize("words", [["--at", "nan"], ["--at", "-1"], ["--reject", "inf"], ["--worst", "0"]])
+def test_numbers_that_mean_nothing_are_usage_errors(log, capsys, words):
+    with pytest.raises(SystemExit) as ended:
+        main(["review", str(log), *words])
+    assert ended.value.code == 2
+    assert "give" in capsys.readouterr().err
+
+
+def test_worst_moments_need_truth(tmp_path, log, monkeypatch):
+    import dataclasses
+
+    from benchmarks.cell import cached_run
+    from benchmarks.review import review as module
+
+    blind = dataclasses.replace(cached_run(log), truth=None)
+    monkeypatch.setattr(module, "cached_run", lambda _: blind)
+    with pytest.raises(ParameterError, match="no ground truth"):
+        review(log, estimators=["dead_reckoning"], worst=1)
+
+
+def test_made_up_run_of_the_cost_measurement_is_written(tmp_path):
+    pytest.importorskip("rerun", reason="needs the extra `review`")
+    measure = runpy.run_path(str(Path(__file__).with_name("long_review.py")))
+    assert measure["cost_s"](500, 2, tmp_path / "long.rrd") > 0.0
+    assert (tmp_path / "long.rrd").stat().st_size > 10_000
