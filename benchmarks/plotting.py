@@ -25,12 +25,19 @@ def require_matplotlib() -> None:
         raise FusionError("figures need matplotlib; pip install 'fusion-localization[plots]'") from error
 
 
-def panels(count: int, height: float, *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
-    """A row of ``count`` axes, ``height`` inches tall; no global state of pyplot, so nothing has to be closed."""
+def panels(count: int, height: float, *, sharey: bool = False, columns: int = 6) -> tuple[Figure, list[Axes]]:
+    """``count`` axes, ``height`` inches tall, at most ``columns`` in a row; no global state of pyplot, so nothing has
+    to be closed.
+    """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(PANEL_INCHES * count, height), layout="constrained")
-    return figure, list(figure.subplots(1, count, sharey=sharey, squeeze=False)[0])
+    across = min(count, columns)
+    down = -(-count // across)
+    figure = Figure(figsize=(PANEL_INCHES * across, height * down), layout="constrained")
+    every = list(figure.subplots(down, across, sharey=sharey, squeeze=False).flat)
+    for unused in every[count:]:
+        unused.remove()
+    return figure, every[:count]
 
 
 def label(axes: Axes, title: str, x: str, y: str) -> None:

@@ -11,6 +11,9 @@ from benchmarks.metrics.score import quantile
 from benchmarks.plotting import label, panels, plain_colour, plain_ticks
 from benchmarks.report.material import Material
 from benchmarks.runner.results import by_contestant, score_matrix
+from benchmarks.sites.placement import Grid, Readings, default_step, error_map
+from fusion import Ranges
+from logs.run import Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
 
 LINES = ("-", "--", ":", "-.")
 BAND = ("anees", "anees_band_low", "anees_band_high")
+PER_ROW = 3
 LONGEST_LINE = 2000
 """Points a line is thinned to: a picture shows no more."""
 
@@ -49,7 +53,7 @@ def _cdf(axes: Axes, material: Material) -> None:
 
 def over_time(material: Material) -> Figure:
     """Position error over time, run by run; gaps where there was no valid answer."""
-    figure, row = panels(max(len(material.scored_runs), 1), 3.2)
+    figure, row = panels(max(len(material.scored_runs), 1), 3.2, columns=PER_ROW)
     for axes, run_id in zip(row, material.scored_runs, strict=False):
         for name in material.contestants:
             if (series := material.series.get((run_id, name))) is not None:
@@ -99,12 +103,14 @@ def _consistency(axes: Axes, material: Material) -> None:
 
 def maps(material: Material) -> Figure:
     """Where the best estimator errs: truth in grey, its track coloured by its error."""
-    figure, row = panels(max(len(material.scored_runs), 1), 4.0)
+    figure, row = panels(max(len(material.scored_runs), 1), 4.0, columns=PER_ROW)
     best = material.contestants[0]
     for axes, run_id in zip(row, material.scored_runs, strict=False):
         if (series := material.series.get((run_id, best))) is None:
             continue
-        world = material.run(run_id).world
+        run = material.run(run_id)
+        world = run.world
+        _bound(axes, run)
         for wall in world.walls:
             axes.plot(*np.array(wall).T, color="0.7", linewidth=1)
         axes.plot(series.instants.x, series.instants.y, color="0.5", linewidth=1)
@@ -117,6 +123,22 @@ def maps(material: Material) -> Figure:
         label(axes, f"{run_id}: {best}", "x, m", "y, m")
         figure.colorbar(drawn, ax=axes, label="position error, cm", shrink=0.8)
     return figure
+
+
+def _bound(axes: Axes, run: Run) -> None:
+    """What the best unbiased fix from one reading of each anchor errs, as contours [m]."""
+    ranged = any(isinstance(measurement, Ranges) for measurement in run.measurements)
+    readings, grid = (
+        Readings("range" if ranged else "rssi"),
+        Grid.over(run.world.bounds, default_step(run.world.bounds)),
+    )
+    if len(run.world.anchors) < 2:
+        return
+    error_m = error_map(run.world.anchors, readings, grid.places(run.world.robot.antenna_m[2]))
+    if np.isfinite(error_m).sum() > 1:
+        levels = np.unique(np.round(np.nanquantile(error_m, (0.1, 0.3, 0.5, 0.7, 0.9)), 2))
+        lines = axes.contour(grid.x, grid.y, error_m, levels=levels, colors="0.8", linewidths=0.8, zorder=0)
+        axes.clabel(lines, fmt="%.2g m", fontsize=6)
 
 
 def cost(material: Material) -> Figure:

@@ -9,11 +9,13 @@ import numpy as np
 
 from benchmarks.metrics.posterior import eff_pcrlb, posterior_bound
 from benchmarks.metrics.score import quantile
+from benchmarks.metrics.track import Floats
 from benchmarks.report.material import Material
 from benchmarks.report.worst import Moment, command
 from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.results import ALIVE, Result, by_contestant, median_metrics, score_matrix
 from benchmarks.sheet import Sheet
+from benchmarks.statistics.statistics import mean_interval
 from benchmarks.table import COLUMNS, as_text
 
 
@@ -29,10 +31,22 @@ def leaderboard(material: Material) -> Sheet:
         scores = np.median(score_matrix(own, material.metric), axis=1)
         worst = f"{100.0 * scores.max():.1f}" if np.isfinite(scores.max()) else "∞"
         numbers = (as_text(column, medians) for column in shown)
-        rows.append((name, letters.get(name, "–"), f"{alive}/{len(own)}", worst, *numbers))
+        rows.append((name, letters.get(name, "–"), f"{alive}/{len(own)}", _interval_cm(scores), worst, *numbers))
     titles = (column.title.replace("\n", " ") for column in shown)
-    head = ("estimator", "alike", "cells ok", f"worst run, {material.metric} cm", *titles)
+    over_runs = (f"{material.metric} over runs, cm [95 %]", f"worst run, {material.metric} cm")
+    head = ("estimator", "alike", "cells ok", *over_runs, *titles)
     return Sheet("Leaderboard: medians over cells without faults", head, tuple(rows))
+
+
+def _interval_cm(scores: Floats) -> str:
+    """Geometric mean over runs with its t interval; the runs that were lost are not in it, and are counted."""
+    alive = scores[np.isfinite(scores) & (scores > 0.0)]
+    if len(alive) < 2:
+        return "–"
+    found = mean_interval(np.log(alive))
+    mean, low, high = (100.0 * math.exp(min(float(value), 50.0)) for value in found[:3])
+    gone = f" ({len(scores) - len(alive)} lost)" if len(alive) < len(scores) else ""
+    return f"{mean:.0f} [{low:.0f}, {high:.0f}]{gone}"
 
 
 def faults(material: Material) -> Sheet:

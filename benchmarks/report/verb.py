@@ -31,7 +31,8 @@ EXPLAINED = {
         "with 95 %; at 10 errors are three times what the covariance claims."
     ),
     "over_time": "Gaps are instants without a valid answer.",
-    "maps": "The best estimator's track, coloured by its error, over the true path; triangles are anchors.",
+    "maps": "The best estimator's track, coloured by its error, over the true path; triangles are anchors, "
+    "contours the least error of a fix from one reading of each (Cramér-Rao).",
     "cost": "Measured alone on one machine by `fusion bench time`. Lower left is better.",
 }
 
