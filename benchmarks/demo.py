@@ -94,5 +94,5 @@ def _next(made: Demo) -> str:
         "\nTry next:\n"
         f"  {view}\n"
         f"  fusion bench {made.log} --estimators ekf --set ekf.gate_probability=0.99\n"
-        f"  fusion simulate arena -o {made.log.with_name('arena.mcap')}\n"
+        "  fusion bench run quick\n"
     )

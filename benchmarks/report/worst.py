@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.metrics.peaks import peaks
 from benchmarks.report.material import Material, Series
 from benchmarks.runner.definition import RunSource
 
-APART_S = 5.0
-"""Moments of one cell nearer than this are one."""
 PER_CELL = 1
 
 
@@ -32,16 +31,10 @@ def worst_moments(material: Material, count: int = 10) -> list[Moment]:
 
 def _of_cell(series: Series) -> list[Moment]:
     error_m = np.where(np.isfinite(series.error_m), series.error_m, -1.0)
-    moments: list[Moment] = []
-    for place in np.argsort(-error_m):
-        if len(moments) == PER_CELL or error_m[place] < 0.0:
-            break
-        time_s = float(series.time_s[place])
-        if all(abs(time_s - moment.time_s) >= APART_S for moment in moments):
-            cell = series.result.cell
-            who = (cell.run, cell.contestant.id, cell.contestant.use)
-            moments.append(Moment(*who, time_s, float(error_m[place])))
-    return moments
+    cell = series.result.cell
+    who = (cell.run, cell.contestant.id, cell.contestant.use)
+    places = peaks(series.instants.time_ns, error_m, PER_CELL)
+    return [Moment(*who, float(series.time_s[k]), float(error_m[k])) for k in places if error_m[k] >= 0.0]
 
 
 def command(moment: Moment) -> str:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.metrics.instants import MAX_AGE_S
-from benchmarks.metrics.track import Floats, Stamps
+from benchmarks.metrics.peaks import peaks
 from benchmarks.review.columns import MEMBERS, DrawnFates, Flags
 from benchmarks.review.drawing import Drawing
 from benchmarks.review.events import OWN_REFUSALS
@@ -20,8 +20,6 @@ from fusion import Decision, Odometry, Reason, WheelTicks
 from fusion.values import nanoseconds, seconds
 from logs.run import Run
 
-SPACING_S = 5.0
-"""Moments closer together are one."""
 JUST_BEFORE_S = 5.0
 """How far back a cause is looked for."""
 SILENCE_S = 2.0
@@ -61,26 +59,6 @@ def worst_moments(run: Run, drawing: Drawing, start_ns: int, count: int) -> list
         causes = tuple(_causes(run, drawing, at_ns)) or ("nothing unusual in the readings",)
         moments.append(Moment(drawing.name, seconds(at_ns - start_ns), float(errors_m[place]), causes))
     return moments
-
-
-def peaks(time_ns: Stamps, values: Floats, count: int) -> list[int]:
-    """Indices of the ``count`` largest local maxima at least `SPACING_S` apart, the largest first, of equal ones the
-    earliest; a plateau counts as its first row.
-    """
-    if len(values) == 0:
-        return []
-    starts = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
-    level = values[starts]
-    above_left = np.concatenate([[True], level[1:] > level[:-1]])
-    above_right = np.concatenate([level[:-1] > level[1:], [True]])
-    chosen: list[int] = []
-    candidates = starts[above_left & above_right]
-    for place in candidates[np.argsort(-values[candidates], kind="stable")].tolist():
-        if all(abs(int(time_ns[place]) - int(time_ns[other])) >= nanoseconds(SPACING_S) for other in chosen):
-            chosen.append(place)
-        if len(chosen) == count:
-            break
-    return chosen
 
 
 def _causes(run: Run, drawing: Drawing, at_ns: int) -> Iterator[str]:

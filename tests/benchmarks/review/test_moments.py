@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 import fusion
 from benchmarks.cell import Cell, score_lane
 from benchmarks.lane import Lane
+from benchmarks.metrics.peaks import SPACING_S, peaks
 from benchmarks.review.drawing import drawings
-from benchmarks.review.moments import SPACING_S, Moment, peaks, worst_moments
+from benchmarks.review.moments import Moment, worst_moments
 from fusion import Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, Truth, Update
 from logs.run import Run, TruthTrack
 
