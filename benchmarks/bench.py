@@ -67,7 +67,9 @@ def check(runs: Sequence[Path], estimators: Sequence[str], settings: Settings) -
             raise LogError(f"{path}: no such file; give an MCAP log (`fusion simulate` makes one)")
     for name, options in settings.items():
         if name not in estimators:
-            raise ParameterError(f"--set {name}: this estimator is not benched; {did_you_mean(name, estimators)}")
+            raise ParameterError(
+                f"--set {name}: this estimator is not among the chosen ones; {did_you_mean(name, estimators)}"
+            )
         fusion.build(name, cached_run(runs[0]).world, options)
 
 

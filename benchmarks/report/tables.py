@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from benchmarks.metrics.posterior import eff_pcrlb, posterior_bound
 from benchmarks.metrics.score import quantile
 from benchmarks.metrics.track import Floats
 from benchmarks.report.material import Material
-from benchmarks.report.worst import Moment, command
+from benchmarks.report.worst import Moment
 from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.results import ALIVE, Result, by_contestant, median_metrics, score_matrix
 from benchmarks.sheet import Sheet
@@ -86,11 +87,11 @@ def limits(material: Material) -> Sheet:
     return Sheet(title, ("estimator", *bounds), tuple(rows))
 
 
-def moments(found: Sequence[Moment]) -> Sheet:
-    """Where to look first."""
+def moments(found: Sequence[Moment], folder: Path) -> Sheet:
+    """Where to look first, for a suite in ``folder``."""
     rows = tuple(
-        (moment.run.id, moment.contestant, f"{moment.time_s:.1f}", f"{100.0 * moment.error_m:.0f}", command(moment))
-        for moment in found
+        (one.run.id, one.contestant.id, f"{one.at_s:.1f}", f"{100.0 * one.error_m:.0f}", one.command(folder))
+        for one in found
     )
     return Sheet("Worst moments", ("run", "estimator", "time, s", "error, cm", "command"), rows, prose=True)
 

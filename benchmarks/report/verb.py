@@ -73,7 +73,7 @@ def _sheets(material: Material, *, limit: bool) -> Iterator[Sheet]:
     if len(material.suite.faults) > 1:
         yield tables.faults(material)
     if found := worst_moments(material):
-        yield tables.moments(found)
+        yield tables.moments(found, material.suite.folder)
     if (lost := tables.lost(material.results)).rows:
         yield lost
 

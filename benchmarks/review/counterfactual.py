@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -69,7 +69,7 @@ def without_radio_at(run: Run, at_s: float) -> Counterfactual:
     return Counterfactual(f"reject {seconds(time_ns - frame.start_ns):.2f} s", replace(run, measurements=kept))
 
 
-def ghost_lane(estimator: str, counterfactual: Counterfactual, seed: int) -> Lane:
+def ghost_lane(estimator: str, params: Mapping[str, object], counterfactual: Counterfactual, seed: int) -> Lane:
     """What ``estimator`` would have made of it, named for both."""
-    lane = run_lane(counterfactual.run, estimator, {}, seed)
+    lane = run_lane(counterfactual.run, estimator, params, seed)
     return replace(lane, name=f"{estimator} {counterfactual.suffix}", ghost_of=estimator)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -41,11 +39,6 @@ class Moment(NamedTuple):
     at_s: float
     error_m: float
     causes: tuple[str, ...]
-
-    def command(self, run: Path, seed: int = 0) -> str:
-        """The command line that opens the review there."""
-        words = ["fusion", "review", str(run), "--estimators", self.estimator, "--at", f"{self.at_s:.2f}"]
-        return shlex.join(words + (["--seed", str(seed)] if seed else []))
 
 
 def worst_moments(run: Run, drawing: Drawing, start_ns: int, count: int) -> list[Moment]:

@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 import fusion
 from benchmarks.arguments import at_least_one, since_start
-from benchmarks.bench import check
+from benchmarks.bench import Settings, check, parse_settings
 from benchmarks.cell import Cell, Score, cached_run, score_lane
 from benchmarks.lane import Lane, run_lane
 from benchmarks.review.counterfactual import Counterfactual, counterfactuals, ghost_lane
 from benchmarks.review.drawing import drawings
 from benchmarks.review.frame import Frame
+from benchmarks.review.invocation import review_command
 from benchmarks.review.moments import Moment, worst_moments
 from benchmarks.review.picture import render
 from benchmarks.review.scene import SUFFIX, write_scene
@@ -44,6 +45,7 @@ def review(
     run: Path,
     *,
     estimators: Sequence[str] | None = None,
+    settings: Settings | None = None,
     save: Path | None = None,
     png: Path | None = None,
     at_s: float | None = None,
@@ -52,9 +54,9 @@ def review(
     reject_s: Sequence[float] = (),
     seed: int = 0,
 ) -> Review:
-    """Run the estimators (None: all installed) over ``run`` and draw them: into ``save`` (one file ``OUT.rrd``, or a
-    folder of layers), into the picture ``png``, or, given neither and no ``worst``, in the viewer. The time cursor of
-    picture and viewer stands ``at_s`` after the start (None: at the end).
+    """Run the estimators (None: all installed), with the parameters ``settings``, over ``run`` and draw them: into
+    ``save`` (one file ``OUT.rrd``, or a folder of layers), into the picture ``png``, or, given neither and no
+    ``worst``, in the viewer. The time cursor of picture and viewer stands ``at_s`` after the start (None: at the end).
 
     ``worst``: how many of the worst moments of each estimator are looked for. ``without`` an anchor, ``reject_s`` the
     radio measurement nearest to a time: each adds what every estimator would have made of that, as a ghost.
@@ -67,11 +69,13 @@ def review(
     if opens or save is not None or png is not None:
         require_rerun()
     names = tuple(dict.fromkeys(fusion.names() if estimators is None else estimators))
-    check([run], names, {})
+    settings = settings or {}
+    check([run], names, settings)
     recorded = cached_run(run)
     if worst and recorded.truth is None:
         raise ParameterError(f"--worst: {run} holds no ground truth, so no moment is worse than another; leave it out")
-    lanes, scores = _folded(recorded, names, counterfactuals(recorded, without, reject_s), seed)
+    chosen = {name: settings.get(name, {}) for name in names}
+    lanes, scores = _folded(recorded, chosen, counterfactuals(recorded, without, reject_s), seed)
     files: list[Path] = []
     if save is not None or opens:
         # The viewer goes on reading after this program has ended, so its file has to stay.
@@ -84,12 +88,12 @@ def review(
     return Review(files, _worst(recorded, lanes, scores, worst) if worst else [])
 
 
-def _folded(
-    run: Run, names: Sequence[str], instead: Sequence[Counterfactual], seed: int
-) -> tuple[list[Lane], list[Score]]:
+def _folded(run: Run, chosen: Settings, instead: Sequence[Counterfactual], seed: int) -> tuple[list[Lane], list[Score]]:
     """What the estimators made of the run, and of what did not happen; each lane with its score."""
-    folds = [(run, run_lane(run, name, {}, seed)) for name in names]
-    folds += [(what_if.run, ghost_lane(name, what_if, seed)) for what_if in instead for name in names]
+    folds = [(run, run_lane(run, name, params, seed)) for name, params in chosen.items()]
+    folds += [
+        (what_if.run, ghost_lane(name, params, what_if, seed)) for what_if in instead for name, params in chosen.items()
+    ]
     scores = [score_lane(Cell(run.path, lane.name, {}, seed), folded, lane) for folded, lane in folds]
     return [lane for _, lane in folds], scores
 
@@ -105,6 +109,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion review``."""
     parser.add_argument("run", type=Path, metavar="RUN", help="an MCAP log")
     parser.add_argument("--estimators", metavar="A,B", help="names, separated by commas; all installed by default")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME.KEY=VALUE", help="a parameter of an estimator; repeatable"
+    )
     parser.add_argument(
         "--save", type=Path, metavar="OUT", help="write OUT.rrd for the Rerun viewer, or a folder of one file a layer"
     )
@@ -133,10 +140,12 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.web and arguments.save is not None and arguments.save.suffix != SUFFIX:
         # The web viewer forgets the layout when a second file follows the one that brings it.
         raise ParameterError(f"--web shows one file, not a folder of layers; give --save {arguments.save}{SUFFIX}")
+    settings = parse_settings(arguments.set)
     with tempfile.TemporaryDirectory(prefix=PREFIX) as folder:
         made = review(
             arguments.run,
             estimators=arguments.estimators.split(",") if arguments.estimators else None,
+            settings=settings,
             save=arguments.save or (Path(folder, SCENE) if arguments.web else None),
             png=arguments.png,
             at_s=arguments.at,
@@ -147,19 +156,20 @@ def run(arguments: argparse.Namespace) -> int:
         )
         for written in ([] if arguments.save is None else made.files) + [arguments.png] * (arguments.png is not None):
             sys.stdout.write(f"{written}\n")
-        sys.stdout.writelines(told(made.moments, arguments.run, arguments.seed))
+        sys.stdout.writelines(told(made.moments, arguments.run, settings, arguments.seed))
         if arguments.web:
             _serve(made.files, arguments.at)
     return 0
 
 
-def told(moments: Sequence[Moment], run: Path, seed: int) -> list[str]:
+def told(moments: Sequence[Moment], run: Path, settings: Settings, seed: int) -> list[str]:
     """The worst moments as lines: what, why, and how to look at it."""
     lines = []
     for moment in moments:
         error = f"{moment.error_m:.2f} m" if math.isfinite(moment.error_m) else "no answer"
         lines.append(f"{moment.estimator} at {moment.at_s:.2f} s: {error}; {', '.join(moment.causes)}\n")
-        lines.append(f"    {moment.command(run, seed)}\n")
+        params = settings.get(moment.estimator)
+        lines.append(f"    {review_command(run, moment.estimator, moment.at_s, params=params, seed=seed)}\n")
     return lines
 
 

@@ -42,7 +42,7 @@ def place_of(source: RunSource, folder: Path) -> Path:
 def open_run(source: RunSource, folder: Path) -> Run:
     """The run, whole; the last few are kept open. Raises `SuiteError`, `LogError` or `WorldError`."""
     if source.scenario is not None:
-        return _simulated(_scenario_place(source.scenario, folder), source.seed, source.duration_s)
+        return _simulated(scenario_of(source.scenario, folder), source.seed, source.duration_s)
     path = place_of(source, folder)
     if source.world is not None:
         topics = tuple(sorted(source.topics.items()))
@@ -72,7 +72,8 @@ def _simulated(scenario: str | Path, seed: int, duration_s: float | None) -> Run
     return run if duration_s is None else _cut(run, nanoseconds(duration_s))
 
 
-def _scenario_place(scenario: str, folder: Path) -> str | Path:
+def scenario_of(scenario: str, folder: Path) -> str | Path:
+    """The name of a scenario of ours, or the place of a scenario file, from the folder of its suite."""
     return folder / scenario if scenario.endswith(".toml") else scenario
 
 
@@ -111,7 +112,7 @@ def content_of(source: RunSource, folder: Path, store: Store) -> Content:
 
 def _content_of_scenario(source: RunSource, folder: Path) -> Content:
     """A simulated run is what its scenario, its seed and the simulator make of it."""
-    text = scenario_text(_scenario_place(str(source.scenario), folder))
+    text = scenario_text(scenario_of(str(source.scenario), folder))
     made = key_of({"text": text, "seed": source.seed, "duration_s": source.duration_s, "code": fingerprint("sensors")})
     return Content(made, made)
 

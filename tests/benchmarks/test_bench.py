@@ -178,7 +178,7 @@ def test_what_is_misspelt_is_refused_before_any_work(tmp_path):
         bench([log], estimators=["toy_weels"])
     with pytest.raises(ParameterError, match="did you mean 'shift_m'"):
         bench([log], estimators=["toy_wheels"], settings={"toy_wheels": {"shift": 1.0}})
-    with pytest.raises(ParameterError, match="not benched"):
+    with pytest.raises(ParameterError, match="not among the chosen ones"):
         bench([log], estimators=["toy_wheels"], settings={"toy_dies": {"shift_m": 1.0}})
     with pytest.raises(LogError, match=r"nothing\.mcap: no such file"):
         bench([tmp_path / "nothing.mcap"], estimators=["toy_wheels"])

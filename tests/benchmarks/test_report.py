@@ -1,8 +1,11 @@
 """The report of a suite: one page, no network, every part of it there, drawn by a real browser without errors."""
 
+import argparse
 import re
+import shlex
 import shutil
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,13 +13,15 @@ import pytest
 from benchmarks.report.figures import FIGURES
 from benchmarks.report.material import Material
 from benchmarks.report.verb import report
-from benchmarks.report.worst import command, worst_moments
-from benchmarks.runner.definition import load_suite
+from benchmarks.report.worst import as_log, worst_moments
+from benchmarks.review.review import review
+from benchmarks.runner.definition import RunSource, load_suite
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
 from fusion.cli import main
+from logs import importing
 
 SUITE = """
 [suite]
@@ -87,13 +92,38 @@ def test_radio_without_radio_is_lost_and_said_to_be(material):
     assert "office radio silence 0" in page
 
 
-def test_worst_moments_are_the_largest_errors_and_lead_to_the_review(material):
+def test_worst_moments_are_the_largest_errors(material):
     moments = worst_moments(material)
     assert [moment.error_m for moment in moments] == sorted((moment.error_m for moment in moments), reverse=True)
     for moment in moments:
-        error_m = material.series[moment.run.id, moment.contestant].error_m
+        error_m = material.series[moment.run.id, moment.contestant.id].error_m
         assert moment.error_m == error_m[np.isfinite(error_m)].max()
-        assert command(moment).endswith(f"--estimators {moment.use} --at {moment.time_s:.1f}")
+
+
+def test_command_of_a_worst_moment_finds_that_moment(material, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    moment = worst_moments(material)[0]
+    made, shown = (shlex.split(part)[1:] for part in moment.command(material.suite.folder).split(" && "))
+    assert main(made) == 0
+    found = review(Path(shown[1]), estimators=[moment.contestant.use], worst=5).moments
+    assert (moment.at_s, moment.error_m) in [pytest.approx((one.at_s, one.error_m), abs=1e-6) for one in found]
+    assert float(shown[shown.index("--at") + 1]) == pytest.approx(moment.at_s, abs=0.006)
+
+
+def test_logs_are_named_from_where_the_suite_is_named_and_bags_are_imported_first(tmp_path):
+    log = tmp_path / "run.mcap"
+    log.touch()
+    assert as_log(RunSource("mine", mcap="run.mcap"), tmp_path) == ([], log)
+    bag = RunSource("bag", mcap="run.mcap", world="w.toml", topics={"odom": "/odom"}, truth_to_map=(1.0, 2.0, 0.5))
+    words, made = as_log(bag, tmp_path)
+    assert made == Path("bag.mcap")
+    parser = argparse.ArgumentParser()
+    importing.configure(parser)
+    arguments = parser.parse_args(words[2:])
+    assert (arguments.kind, arguments.folder) == ("rosbag", log)
+    assert (arguments.world, arguments.output) == (tmp_path / "w.toml", made)
+    assert arguments.topic == ["odom=/odom"]
+    assert arguments.truth_to_map == [1.0, 2.0, 0.5]
 
 
 def test_contestants_are_ordered_by_the_median_of_what_is_compared(material):

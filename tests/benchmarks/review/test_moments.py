@@ -9,10 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fusion
+from benchmarks.bench import parse_settings
 from benchmarks.cell import Cell, score_lane
 from benchmarks.lane import Lane
 from benchmarks.metrics.peaks import SPACING_S, peaks
 from benchmarks.review.drawing import drawings
+from benchmarks.review.invocation import review_command
 from benchmarks.review.moments import Moment, worst_moments
 from fusion import Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, Truth, Update
 from logs.run import Run, TruthTrack
@@ -154,11 +156,14 @@ def test_method_without_radio_says_so(tmp_path):
     assert moment.causes == ("uses no radio",)
 
 
-def test_command_can_be_pasted_and_names_a_seed_that_matters(tmp_path):
-    moment = moment_of(tmp_path, all_taken)
-    words = shlex.split(moment.command(tmp_path / "a run.mcap"))
-    assert words == ["fusion", "review", str(tmp_path / "a run.mcap"), "--estimators", "toy", "--at", "30.00"]
-    assert moment.command(tmp_path, 7).endswith(" --seed 7")
+def test_command_can_be_pasted_and_names_parameters_and_a_seed_that_matters(tmp_path):
+    run = tmp_path / "a run.mcap"
+    words = shlex.split(review_command(run, "ekf", 30.0))
+    assert words == ["fusion", "review", str(run), "--estimators", "ekf", "--at", "30.00"]
+    words = shlex.split(review_command(run, "ekf", 30.0, params={"gate_probability": 0.9, "mode": "fast"}, seed=7))
+    assert words[7:9] == ["--set", "ekf.gate_probability=0.9"]
+    assert parse_settings(words[8:11:2]) == {"ekf": {"gate_probability": 0.9, "mode": "fast"}}
+    assert words[-2:] == ["--seed", "7"]
 
 
 def test_lane_that_crashed_has_no_moments(tmp_path):

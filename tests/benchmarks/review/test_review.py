@@ -39,6 +39,25 @@ def test_worst_moment_is_the_largest_error_of_the_scores(log):
     assert made.files == []
 
 
+def test_parameters_are_given_reach_the_estimator_and_stand_in_the_command(log, capsys):
+    word = "ekf.gate_probability=0.5"
+    _, plain, _ = told(capsys, log, "--estimators", "ekf", "--worst", "1")
+    code, out, _ = told(capsys, log, "--estimators", "ekf", "--worst", "1", "--set", word)
+    assert code == 0
+    assert out.splitlines()[0] != plain.splitlines()[0]
+    assert out.endswith(f" --set {word}\n")
+
+
+@pytest.mark.parametrize(
+    ("word", "told_of"),
+    [("ekf.gate=1", "gate_probability"), ("efk.gate_probability=0.9", "did you mean 'ekf'"), ("gate=1", "expected")],
+)
+def test_parameters_that_are_none_are_refused(log, capsys, word, told_of):
+    code, _, err = told(capsys, log, "--estimators", "ekf", "--worst", "1", "--set", word)
+    assert code == 1
+    assert told_of in err
+
+
 def test_layers_and_ghosts_are_written_and_named(log, tmp_path, capsys):
     pytest.importorskip("rerun", reason="needs the extra `review`")
     folder = tmp_path / "layers"

@@ -255,7 +255,7 @@ def test_ghost_has_a_track_errors_and_a_row_in_the_table_and_nothing_else(tmp_pa
 def ghosted(run):
     lanes, scores = scored(run, ["toy"])
     what_if = without_anchor(run, "02:00:5e:00")
-    ghost = ghost_lane("toy", what_if, 0)
+    ghost = ghost_lane("toy", {}, what_if, 0)
     return [*lanes, ghost], [*scores, score_lane(Cell(run.path, ghost.name, {}, 0), what_if.run, ghost)]
 
 
