@@ -121,7 +121,7 @@ class BayesWeight:
         A position that may be anywhere on the floor expects a good fix no less than an outlier there, so that
         probability is then the prior one.
         """
-        p, r = np.array(covariance.matrix), np.array([[fix.xx, fix.xy], [fix.xy, fix.yy]])
+        p, r = np.array(covariance.matrix), np.array(fix.matrix)
         innovation, h = fix_innovation(pose, fix, self._world.robot)
         s = h @ p @ h.T + r
         good = self._probability_good(innovation, s) if position_known else 1.0 - self._outlier_probability
@@ -130,8 +130,7 @@ class BayesWeight:
         jump = gain @ innovation
         p = p - good * gain @ s @ gain.T + good * (1.0 - good) * np.outer(jump, jump)
         x, y, heading = (np.array(pose) + good * jump).tolist()
-        cells = (0.5 * (p + p.T)).tolist()
-        spread = Covariance(cells[0][0], cells[0][1], cells[0][2], cells[1][1], cells[1][2], cells[2][2])
+        spread = Covariance.from_matrix((0.5 * (p + p.T)).tolist())
         return Pose(x, y, wrap_angle(heading)), spread, good
 
     def _probability_good(self, innovation: Array, s: Array) -> float:

@@ -38,7 +38,7 @@ from fusion import (
     sightings,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.fix import Array, Recent, fix_fates, fix_from, fix_innovation, remember
+from fusion.fix import Recent, fix_fates, fix_from, fix_innovation, remember
 from fusion.screen import unusable
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds
@@ -135,7 +135,7 @@ class DynamicWeightRepaired:
         if not state.position_known:
             return 1.0, 0
         innovation, h = fix_innovation(pose, fix, self._world.robot)
-        spread = h @ np.array(covariance.matrix) @ h.T + _noise(fix)
+        spread = h @ np.array(covariance.matrix) @ h.T + np.array(fix.matrix)
         nis = float(innovation @ np.linalg.solve(spread, innovation))
         outlier = nis > self._gate * (1.0 + self._widening * state.odo_counter) ** 2
         return allocate(state.odo_counter, self._epsilon, self._raised_weight, outlier=outlier)
@@ -147,11 +147,6 @@ def average(pose: Pose, covariance: Covariance, fix: Fix, wifi_weight: float, wo
     target = (pose.x + float(innovation[0]), pose.y + float(innovation[1]))
     gain = wifi_weight * np.eye(3, 2)
     left = np.eye(3) - gain @ h
-    p = left @ np.array(covariance.matrix) @ left.T + gain @ _noise(fix) @ gain.T
-    cells = (0.5 * (p + p.T)).tolist()
-    spread = Covariance(cells[0][0], cells[0][1], cells[0][2], cells[1][1], cells[1][2], cells[2][2])
+    p = left @ np.array(covariance.matrix) @ left.T + gain @ np.array(fix.matrix) @ gain.T
+    spread = Covariance.from_matrix((0.5 * (p + p.T)).tolist())
     return Pose(*weighted_average((pose.x, pose.y), target, wifi_weight), pose.heading), spread
-
-
-def _noise(fix: Fix) -> Array:
-    return np.array([[fix.xx, fix.xy], [fix.xy, fix.yy]])

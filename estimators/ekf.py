@@ -142,7 +142,7 @@ class Ekf:
         """The pose after the motion since the last reading."""
         mean, covariance = self._moved(state)
         p = covariance.tolist()
-        spread = Covariance(p[0][0], p[0][1], p[0][2], p[1][1], p[1][2], p[2][2])
+        spread = Covariance.from_matrix(p)
         known = spread.hh < HEADING_KNOWN_STD**2
         x, y, heading = mean[POSE].tolist()
         return Estimate(time_ns, Pose(x, y, wrap_angle(heading)), spread, heading_known=known)

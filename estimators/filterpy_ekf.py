@@ -186,4 +186,4 @@ def copied_out(belief: Any) -> tuple[Pose, Covariance]:  # noqa: ANN401
     """Pose and covariance of filterpy's filter, the heading wrapped."""
     x, y, heading = np.ravel(belief.x).tolist()
     p = (0.5 * (belief.P + belief.P.T)).tolist()
-    return Pose(x, y, wrap_angle(heading)), Covariance(p[0][0], p[0][1], p[0][2], p[1][1], p[1][2], p[2][2])
+    return Pose(x, y, wrap_angle(heading)), Covariance.from_matrix(p)

@@ -7,6 +7,7 @@ x is forward, y is left, heading is counter-clockwise from the map's x axis (REP
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 
@@ -57,6 +58,11 @@ class Covariance(NamedTuple):
     def from_std(cls, x_std: float, y_std: float, heading_std: float) -> Covariance:
         """From standard deviations [m, m, rad]: the one place where the two meet."""
         return cls(x_std * x_std, 0.0, 0.0, y_std * y_std, 0.0, heading_std * heading_std)
+
+    @classmethod
+    def from_matrix(cls, p: Sequence[Sequence[float]]) -> Covariance:
+        """From the rows of a symmetric (3, 3) of plain numbers; what is below the diagonal is not read."""
+        return cls(p[0][0], p[0][1], p[0][2], p[1][1], p[1][2], p[2][2])
 
     @property
     def matrix(self) -> tuple[tuple[float, float, float], ...]:

@@ -29,6 +29,11 @@ class Fix(NamedTuple):
     xy: float
     yy: float
 
+    @property
+    def matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """The whole covariance, (2, 2), row by row."""
+        return ((self.xx, self.xy), (self.xy, self.yy))
+
 
 def are_collinear(anchors: Array) -> bool:
     """Whether the ``anchors`` (n, 2) [m] lie on one line (or point), which leaves two mirror images of every fix."""

@@ -154,7 +154,7 @@ class AtTruth:
     def estimate(self, state: State, time_ns: int) -> Estimate:
         """The truth, with the bound as its covariance."""
         p = self._moved(state, time_ns)[POSE, POSE].tolist()
-        covariance = Covariance(p[0][0], p[0][1], p[0][2], p[1][1], p[1][2], p[2][2])
+        covariance = Covariance.from_matrix(p)
         return Estimate(time_ns, self._pose(time_ns), covariance)
 
     def _pose(self, time_ns: int) -> Pose:
