@@ -23,6 +23,10 @@ from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.results import RANKED_BY
 from benchmarks.runner.store import Store
 from benchmarks.sheet import Sheet, as_markdown
+from benchmarks.statistics.within_run import LEAST_INSTANTS, within_run
+
+WITHIN_RUN = ("pos_p75", 0.75)
+"""The quantile that is compared within one run; its instants have no other score."""
 
 EXPLAINED = {
     "summary": (
@@ -61,7 +65,18 @@ def _verdicts(material: Material) -> Iterator[str]:
         return
     best = material.contestants[0]
     told = [verdict.sentence for verdict in material.comparison.verdicts if best in (verdict.first, verdict.second)]
-    yield "\n".join(f"- {sentence}" for sentence in told)
+    yield "\n".join(f"- {sentence}" for sentence in told + _within_the_run(material))
+
+
+def _within_the_run(material: Material) -> list[str]:
+    """Where one run is all there is: what it says of itself, of the best against every other."""
+    if len(material.scored_runs) != 1:
+        return []
+    errors = {name: series.error_m for (_, name), series in material.series.items()}
+    best, *others = (name for name in material.contestants if name in errors)
+    if len(errors[best]) < LEAST_INSTANTS:
+        return []
+    return [within_run(best, other, errors, *WITHIN_RUN).sentence for other in others]
 
 
 def _sheets(material: Material, *, limit: bool) -> Iterator[Sheet]:

@@ -86,6 +86,17 @@ def test_distance_from_the_limit_is_told_where_it_is_asked_for(material):
     assert all(float(ratio) > 0.0 for ratio in row)
 
 
+def test_what_one_run_says_of_itself_is_told_only_where_it_is_the_only_one(material, tmp_path):
+    assert "within this run" not in report(material, "")
+    office, _, rest = SUITE.partition('[[runs]]\nid = "mec"')
+    (tmp_path / "one.toml").write_text(office + rest[rest.index("[[estimators]]") :], encoding="utf-8")
+    suite, store = load_suite(tmp_path / "one.toml"), Store(tmp_path / "store")
+    run_suite(suite, store, workers=1)
+    page = report(Material(suite, read_results(cells_of(suite, store), store), store), "")
+    assert len(re.findall(r"- within this run, wheels beats radio by .*; says nothing of other runs", page)) == 1
+    assert "cannot tell wheels from radio" in page
+
+
 def test_radio_without_radio_is_lost_and_said_to_be(material):
     page = report(material, "")
     assert re.search(r"\| radio \|.*∞", page)
