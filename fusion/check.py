@@ -1,4 +1,4 @@
-"""``fusion check``: hold an estimator against every promise of the contract, one line each."""
+"""``fusion check``: hold an estimator, or a driver, against every promise of its contract, one line each."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ import json
 import sys
 
 from fusion.conformance import Outcome, Verdict, run_checks
+from fusion.driver_kit import run_driver_checks
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Arguments of `fusion check`."""
     parser.add_argument("name", metavar="NAME", help="the estimator; `fusion estimators` lists them")
+    parser.add_argument("--driver", action="store_true", help="NAME is a driver; `fusion sensors` lists them")
     parser.add_argument("--json", action="store_true", help="as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Check, tell; 1 when a promise is broken."""
-    verdicts = run_checks(arguments.name)
+    verdicts = run_driver_checks(arguments.name) if arguments.driver else run_checks(arguments.name)
     if arguments.json:
         rows = [verdict._asdict() | {"outcome": verdict.outcome.value} for verdict in verdicts]
         sys.stdout.write(json.dumps(rows, indent=2) + "\n")

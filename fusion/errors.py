@@ -9,7 +9,16 @@
     ├── RecordingError    a foreign recording cannot be imported           → compare the folder with the docs
     ├── SuiteError        a suite of benchmarks contradicts itself         → edit the suite file
     ├── ConformanceError  an estimator breaks a promise of the contract    → fix the estimator
-    └── ViewerError       the Rerun viewer cannot be used here             → install what the message names
+    ├── ViewerError       the Rerun viewer cannot be used here             → install what the message names
+    └── DriverError       a sensor cannot be used now                      → do what its ``hint`` says
+        ├── SettingError           a setting is refused, by us or by the device  → correct the robot file
+        ├── DependencyError        a package or tool is missing                  → install it
+        ├── UnsupportedError       the device or kernel cannot do this           → another device or backend
+        ├── NotPermittedError      this user may not                             → the capability or group it names
+        ├── NotFoundError          the device is not there                       → plug it in; we go on looking
+        ├── BusyError              somebody else has it                          → stop that one; we go on trying
+        ├── DeviceLostError        it was there and went away                    → nothing; we go on trying
+        └── ProtocolError          it says what nobody understands               → check firmware and wiring
 
 ``except FusionError`` catches them all. A message says what, which value, where, and what to do next.
 """
@@ -17,6 +26,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import ClassVar
 
 
 class FusionError(Exception):
@@ -57,6 +67,58 @@ class ConformanceError(FusionError):
 
 class ViewerError(FusionError):
     """The Rerun viewer cannot be used on this machine."""
+
+
+class DriverError(FusionError):
+    """A sensor cannot be used now. ``hint`` is what cures it, a command where one does."""
+
+    passes: ClassVar[bool] = False
+    """Whether it may pass by itself, so that trying again makes sense; if not, a person is needed."""
+
+    def __init__(self, what: str, hint: str) -> None:
+        super().__init__(f"{what}; {hint}")
+        self.what = what
+        self.hint = hint
+
+
+class SettingError(DriverError):
+    """A setting of a driver is refused, by us or by the device."""
+
+
+class DependencyError(DriverError):
+    """A Python package or a program that the driver needs is not installed."""
+
+
+class UnsupportedError(DriverError):
+    """The device, its firmware or this kernel cannot do what is asked."""
+
+
+class NotPermittedError(DriverError):
+    """The user who runs this may not use the device."""
+
+
+class NotFoundError(DriverError):
+    """The device is not there."""
+
+    passes = True
+
+
+class BusyError(DriverError):
+    """Somebody else has the device."""
+
+    passes = True
+
+
+class DeviceLostError(DriverError):
+    """The device was there and went away, or fell silent."""
+
+    passes = True
+
+
+class ProtocolError(DriverError):
+    """The device says what nobody understands."""
+
+    passes = True
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
