@@ -81,7 +81,7 @@ def drive(seconds=20, seed=1):
 
 
 @given(angles, st.integers(-5, 5))
-@settings(deadline=None, derandomize=True)
+@settings(derandomize=True)
 def test_wrapped_angle_is_the_same_angle(angle, turns):
     wrapped = wrap_angle(angle + turns * math.tau)
     assert -math.pi < wrapped <= math.pi
@@ -89,14 +89,14 @@ def test_wrapped_angle_is_the_same_angle(angle, turns):
 
 
 @given(reals, reals, angles)
-@settings(deadline=None, derandomize=True)
+@settings(derandomize=True)
 def test_pose_composed_with_its_inverse_is_the_origin(x, y, heading):
     pose = Pose(x, y, heading)
     assert pose.compose(pose.inverse()) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
 
 
 @given(st.floats(1.0, 500.0), st.floats(1.2, 5.0))
-@settings(deadline=None, derandomize=True)
+@settings(derandomize=True)
 def test_path_loss_inverts(distance_m, exponent):
     model = PathLoss(path_loss_exponent=exponent)
     assert float(model.distance(model.expected(distance_m))) == pytest.approx(distance_m, rel=1e-12)
@@ -115,7 +115,7 @@ def test_free_space_loss_at_a_metre_is_that_of_friis():
 
 
 @given(st.floats(-20, 20), st.floats(-20, 20))
-@settings(deadline=None, derandomize=True)
+@settings(derandomize=True)
 def test_trilateration_finds_the_place_from_exact_distances(x, y):
     anchors = np.array([[0.0, 0.0], [10.0, 1.0], [3.0, 8.0], [12.0, 9.0]])
     distances = np.hypot(*(anchors - (x, y)).T)
@@ -132,7 +132,7 @@ def test_collinear_anchors_are_refused_by_the_closed_form():
 
 @pytest.mark.parametrize("model", ["radio", "ranging"])
 @given(x=reals, y=reals, heading=angles)
-@settings(deadline=None, derandomize=True, max_examples=40)
+@settings(derandomize=True, max_examples=40)
 def test_derivatives_of_a_sighting_are_those_of_finite_differences(model, x, y, heading):
     place = world(robot={"antenna_m": [0.3, -0.2, 0.5]})
     scan = (

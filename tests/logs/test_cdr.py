@@ -78,7 +78,7 @@ FIELDS = st.one_of(
 
 
 def test_fields_of_any_kind_in_any_order_come_back_to_the_bit():
-    @settings(derandomize=True, deadline=None, max_examples=200)
+    @settings(derandomize=True, max_examples=200)
     @given(st.lists(FIELDS, max_size=12))
     def check(fields):
         packer = Packer()

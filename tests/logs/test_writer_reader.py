@@ -50,7 +50,7 @@ def ten_seconds():
 
 
 def test_every_finite_heading_of_the_prior_comes_back_to_the_bit(tmp_path):
-    @settings(derandomize=True, deadline=None, max_examples=30)
+    @settings(derandomize=True, max_examples=30)
     @given(st.floats(-math.pi, math.pi), st.booleans(), st.booleans())
     def check(heading, position_known, heading_known):
         covariance = Covariance(1.0, 0.1, 0.2, 2.0, 0.3, 3.0)

@@ -144,7 +144,7 @@ def test_track_alone_is_matched_as_its_updates_were():
     np.testing.assert_array_equal(Track.of_estimates([updates[1].estimate]).covariance_matrices[0], claimed.matrix)
 
 
-@settings(derandomize=True, deadline=None, max_examples=50)
+@settings(derandomize=True, max_examples=50)
 @given(st.lists(st.integers(0, 40), min_size=1, max_size=20), st.lists(st.integers(0, 50), min_size=1, unique=True))
 def test_matching_agrees_with_its_definition(arrivals, asked):
     updates = [update_at(time_ns, float(i)) for i, time_ns in enumerate(arrivals)]

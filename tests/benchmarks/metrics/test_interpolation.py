@@ -64,7 +64,7 @@ def test_nothing_to_meet_leaves_nothing():
 VALUES = st.lists(st.floats(0.0, 100.0), min_size=1, max_size=30)
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(derandomize=True, max_examples=60)
 @given(VALUES, st.floats(0.0, 1.0), st.floats(0.1, 10.0))
 def test_equal_weights_change_nothing(values, share, weight):
     values = np.array(values)

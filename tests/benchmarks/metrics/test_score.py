@@ -226,7 +226,7 @@ AXES = ("abs_", "bias_", "cov_", "coverage")
 """What may change when the map is turned or moved, cells of the floor among it."""
 
 
-@settings(derandomize=True, deadline=None, max_examples=25)
+@settings(derandomize=True, max_examples=25)
 @given(st.floats(-3.0, 3.0), st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.integers(0, 400))
 def test_turning_and_moving_the_world_leaves_all_but_the_axis_metrics(yaw, shift_x, shift_y, dead):
     instants = evaluation_instants(TRUTH)
