@@ -26,6 +26,8 @@ class Verb(NamedTuple):
 VERBS = {
     "demo": Verb("benchmarks.demo", "the whole promise in one command: simulate, record, score, show"),
     "simulate": Verb("sensors.simulate", "drive a simulated robot and record it as an MCAP log"),
+    "record": Verb("sensors.record", "the sensors of a robot into logs, until somebody says stop"),
+    "join": Verb("logs.joining", "the files of one recording become one log"),
     "import": Verb("logs.importing", "turn a recording of another format into an MCAP log"),
     "export": Verb("logs.export", "turn a log into CSV or TUM files"),
     "info": Verb("logs.info", "what is in a log"),

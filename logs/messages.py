@@ -57,6 +57,12 @@ SCHEMAS = {
     "std_msgs/Header header\nFate[] fates\n" + STAMPED + SEPARATOR
     + "MSG: fusion_msgs/Fate\nstring anchor\nstring decision\nstring reason\nfloat64 weight\nfloat64 innovation\n"
     "float64 innovation_variance\nfloat64 nis\n",
+    "fusion_msgs/msg/ClockSync": "# the clocks of one computer at one moment; all stamps are boot_ns\n"
+    "std_msgs/Header header\nint64 boot_ns\nint64 monotonic_ns\nint64 real_ns\nbool ntp_synced\n" + STAMPED,
+    "diagnostic_msgs/msg/DiagnosticArray": "std_msgs/Header header\nDiagnosticStatus[] status\n" + STAMPED + SEPARATOR
+    + "MSG: diagnostic_msgs/DiagnosticStatus\nbyte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\nbyte level\n"
+    "string name\nstring message\nstring hardware_id\nKeyValue[] values\n" + SEPARATOR
+    + "MSG: diagnostic_msgs/KeyValue\nstring key\nstring value\n",
     "sensor_msgs/msg/Imu": "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\n"
     "float64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\n"
     "float64[9] angular_velocity_covariance\ngeometry_msgs/Vector3 linear_acceleration\n"
@@ -76,7 +82,8 @@ END_OF_TIME_NS = 2**31 * NANOSECONDS
 """First time that builtin_interfaces/Time cannot hold (in the year 2038, where time counts from 1970)."""
 
 
-def _stamped(time_ns: int, frame_id: str) -> Packer:
+def stamped(time_ns: int, frame_id: str) -> Packer:
+    """A message that begins with a std_msgs/Header; raises `LogError` for a time that none can hold."""
     if not 0 <= time_ns < END_OF_TIME_NS:
         raise LogError(f"{frame_id} at {time_ns} ns: a log holds times from 0 to 2^31 s; shift the run's clock")
     sec, nanosec = divmod(time_ns, NANOSECONDS)
@@ -131,7 +138,7 @@ def _take_covariance(cursor: Unpacker) -> Covariance | None:
 
 
 def _encode_ticks(value: WheelTicks) -> bytes:
-    return _stamped(value.time_ns, value.sensor).put("I", len(value.counts)).put("q", *value.counts).message()
+    return stamped(value.time_ns, value.sensor).put("I", len(value.counts)).put("q", *value.counts).message()
 
 
 def _decode_ticks(data: bytes, seq: int) -> WheelTicks:
@@ -143,7 +150,7 @@ def _decode_ticks(data: bytes, seq: int) -> WheelTicks:
 
 def _encode_command(value: MotorCommand) -> bytes:
     speeds = value.wheel_speeds_m_s
-    return _stamped(value.time_ns, value.sensor).put("I", len(speeds)).put("d", *speeds).message()
+    return stamped(value.time_ns, value.sensor).put("I", len(speeds)).put("d", *speeds).message()
 
 
 def _decode_command(data: bytes, seq: int) -> MotorCommand:
@@ -153,7 +160,7 @@ def _decode_command(data: bytes, seq: int) -> MotorCommand:
 
 
 def _encode_odometry(value: Odometry) -> bytes:
-    message = _stamped(value.time_ns, value.sensor).put("q", value.from_ns)
+    message = stamped(value.time_ns, value.sensor).put("q", value.from_ns)
     return message.put("d", value.distance_m, value.turn_rad).put("?", value.measured).message()
 
 
@@ -168,7 +175,7 @@ def _decode_odometry(data: bytes, seq: int) -> Odometry:
 def _encode_gyro(value: Gyro) -> bytes:
     no_orientation = (0.0, 0.0, 0.0, 1.0, NOT_GIVEN, *[0.0] * 8)
     no_acceleration = (0.0, 0.0, 0.0, NOT_GIVEN, *[0.0] * 8)
-    message = _stamped(value.time_ns, value.sensor).put("d", *no_orientation)
+    message = stamped(value.time_ns, value.sensor).put("d", *no_orientation)
     return message.put("d", 0.0, 0.0, value.rate_rad_s, *[0.0] * 9, *no_acceleration).message()
 
 
@@ -182,7 +189,7 @@ def _decode_gyro(data: bytes, seq: int) -> Gyro:
 
 
 def _encode_scan(value: WifiScan) -> bytes:
-    message = _stamped(value.time_ns, value.sensor).put("I", len(value.readings))
+    message = stamped(value.time_ns, value.sensor).put("I", len(value.readings))
     for reading in value.readings:
         message.text(reading.anchor).put("d", reading.rssi_dbm).put("q", reading.age_ns)
     return message.message()
@@ -196,7 +203,7 @@ def _decode_scan(data: bytes, seq: int) -> WifiScan:
 
 
 def _encode_ranges(value: Ranges) -> bytes:
-    message = _stamped(value.time_ns, value.sensor).put("I", len(value.readings))
+    message = stamped(value.time_ns, value.sensor).put("I", len(value.readings))
     for reading in value.readings:
         message.text(reading.anchor).put("d", reading.range_m, _number(reading.std_m))
     return message.message()
@@ -240,7 +247,7 @@ FATES_TOPIC = "/fates/"
 def encode_truth(truth: Truth) -> bytes:
     """Ground truth."""
     pose, known = Pose(truth.x, truth.y, truth.heading or 0.0), truth.heading is not None
-    return _put_pose(_stamped(truth.time_ns, MAP), pose, heading_known=known).message()
+    return _put_pose(stamped(truth.time_ns, MAP), pose, heading_known=known).message()
 
 
 def decode_truth(data: bytes) -> Truth:
@@ -253,7 +260,7 @@ def decode_truth(data: bytes) -> Truth:
 
 def encode_prior(prior: Prior) -> tuple[bytes, dict[str, str]]:
     """The starting pose, and what goes into the log's metadata: what of it is known, and the heading to the bit."""
-    message = _put_pose(_stamped(prior.time_ns, MAP), prior.pose, heading_known=prior.heading_known)
+    message = _put_pose(stamped(prior.time_ns, MAP), prior.pose, heading_known=prior.heading_known)
     about = {
         "position_known": str(prior.position_known).lower(),
         "heading_known": str(prior.heading_known).lower(),
@@ -277,7 +284,7 @@ def decode_prior(data: bytes, about: Mapping[str, str]) -> Prior:
 
 def encode_estimate(estimate: Estimate) -> bytes:
     """An estimate; one without a covariance says so in its first element."""
-    message = _put_pose(_stamped(estimate.time_ns, MAP), estimate.pose, heading_known=estimate.heading_known)
+    message = _put_pose(stamped(estimate.time_ns, MAP), estimate.pose, heading_known=estimate.heading_known)
     return _put_covariance(message, estimate.covariance).message()
 
 
@@ -291,7 +298,7 @@ def decode_estimate(data: bytes) -> Estimate:
 
 def encode_fates(time_ns: int, sensor: str, fates: tuple[Fate, ...]) -> bytes:
     """What became of the readings of one measurement."""
-    message = _stamped(time_ns, sensor).put("I", len(fates))
+    message = stamped(time_ns, sensor).put("I", len(fates))
     for fate in fates:
         message.text(fate.anchor).text(fate.decision.value).text(fate.reason.value)
         numbers = (fate.innovation, fate.innovation_variance, fate.nis)

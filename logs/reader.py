@@ -8,8 +8,9 @@ from pathlib import Path
 
 from mcap.records import Message
 
-from fusion import Estimate, FusionError, LogError, Measurement, Prior, Truth, World
-from logs import messages
+from fusion import Estimate, FusionError, LogError, Measurement, Prior, Remark, Truth, World
+from logs import device_messages, messages
+from logs.device_messages import ClockSync
 from logs.messages import DECODERS, ESTIMATE_TOPIC, FATES_TOPIC
 from logs.run import Run, TruthTrack
 from logs.walk import Walk
@@ -25,6 +26,8 @@ class _Contents:
     truths: list[Truth] = field(default_factory=list)
     prior: Prior | None = None
     lanes: dict[str, list[Estimate]] = field(default_factory=dict)
+    remarks: list[Remark] = field(default_factory=list)
+    clocks: list[ClockSync] = field(default_factory=list)
     unreadable: dict[str, int] = field(default_factory=dict)
     foreign: dict[str, int] = field(default_factory=dict)
 
@@ -34,7 +37,7 @@ def read_run(path: Path) -> Run:
     walk = Walk(path)
     contents = _contents(walk)
     world = _world(path, contents)
-    if not (contents.measurements or contents.truths or contents.lanes):
+    if not (contents.measurements or contents.truths or contents.lanes or contents.clocks or contents.prior):
         raise LogError(f"{path}: holds no messages, or none that can be read; record or import it again")
     contents.measurements.sort(key=lambda item: item[0])
     return Run(
@@ -47,6 +50,8 @@ def read_run(path: Path) -> Run:
         truth=TruthTrack.from_truths(contents.truths) if contents.truths else None,
         warnings=(*walk.warnings, *_warnings(path, contents, world)),
         lanes={name: tuple(estimates) for name, estimates in contents.lanes.items()},
+        remarks=tuple(contents.remarks),
+        clocks=tuple(contents.clocks),
     )
 
 
@@ -87,6 +92,10 @@ def _take(contents: _Contents, topic: str, schema: str, message: Message) -> Non
         elif topic.startswith(ESTIMATE_TOPIC):
             estimate = messages.decode_estimate(message.data)
             contents.lanes.setdefault(topic.removeprefix(ESTIMATE_TOPIC), []).append(estimate)
+        elif topic == device_messages.REMARKS[0]:
+            contents.remarks.append(device_messages.decode_remark(message.data))
+        elif topic == device_messages.CLOCKS[0]:
+            contents.clocks.append(device_messages.decode_clock(message.data))
         elif schema in DECODERS:
             contents.measurements.append((message.log_time, DECODERS[schema](message.data, message.sequence)))
         elif not topic.startswith(FATES_TOPIC):

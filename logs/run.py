@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fusion import Estimate, Measurement, Prior, Truth, World
+from fusion import Estimate, Measurement, Prior, Remark, Truth, World
+from logs.device_messages import ClockSync
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,8 @@ class TruthTrack:
 @dataclass(frozen=True, slots=True)
 class Run:
     """One recorded run. ``measurements`` stand in the order they arrived; ``lanes`` holds the estimates of estimators
-    that were replayed into the log, by name.
+    that were replayed into the log, by name; ``remarks`` are what the devices said that is no measurement,
+    ``clocks`` how the clocks of the recording computer stood to each other.
     """
 
     path: Path
@@ -52,3 +54,5 @@ class Run:
     truth: TruthTrack | None
     warnings: tuple[str, ...]
     lanes: Mapping[str, tuple[Estimate, ...]]
+    remarks: tuple[Remark, ...] = ()
+    clocks: tuple[ClockSync, ...] = ()

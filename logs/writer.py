@@ -17,18 +17,21 @@ from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import IO
 
+from mcap.records import Message
 from mcap.writer import Writer
 
-from fusion import LogError, Measurement, Prior, Truth, Update, World
+from fusion import LogError, Measurement, Prior, Remark, Truth, Update, World
 from fusion.values import nanoseconds
-from logs import messages
+from logs import device_messages, messages
+from logs.device_messages import ClockSync
 from logs.messages import ESTIMATE_TOPIC, FATES_TOPIC, KINDS, SCHEMAS
 
 RUN_RECORD = "fusion"
 """Name of the metadata record that makes an MCAP file one of ours."""
-FLUSH_NS = nanoseconds(1.0)
-SYNC_S = 0.9
-"""A little less than a second, so that a flush which comes early by a hair is synced all the same."""
+FLUSH_NS = nanoseconds(0.9)
+"""A little less than the second that a crash may cost, since what is received must still be written."""
+SYNC_S = 0.8
+"""Less than a flush is apart from the next, so that every one of a live recording is synced."""
 FATES = "fusion_msgs/msg/Fates"
 
 
@@ -43,8 +46,9 @@ class RunWriter:
         name: str,
         prior: Prior | None = None,
         metadata: Mapping[str, str] = MappingProxyType({}),
+        attachments: Mapping[str, bytes] = MappingProxyType({}),
     ) -> None:
-        """Start a log at ``path``; raises `LogError` where it cannot be written."""
+        """Start a log at ``path``, with files to keep in it by name; raises `LogError` where it cannot be written."""
         start, about = (b"", {}) if prior is None else messages.encode_prior(prior)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -61,6 +65,8 @@ class RunWriter:
         record = {**metadata, **about, "name": name, "world": world.table, "world_hash": world.hash}
         self._writer.add_metadata(RUN_RECORD, record)
         self._writer.add_attachment(0, 0, "world.json", "application/json", world.table.encode())
+        for title, content in attachments.items():
+            self._writer.add_attachment(0, 0, title, "application/octet-stream", content)
         for kind in KINDS.values():
             self._channel(kind.topic, kind.schema)
         self._channel(*messages.TRUTH)
@@ -78,6 +84,15 @@ class RunWriter:
         log_ns = truth.time_ns if log_time_ns is None else log_time_ns
         self._add(*messages.TRUTH, log_ns, truth.time_ns, 0, messages.encode_truth(truth))
 
+    def write_remark(self, remark: Remark, *, log_time_ns: int | None = None) -> None:
+        """Append what a device remarked; ``log_time_ns`` says when that arrived."""
+        log_ns = remark.time_ns if log_time_ns is None else log_time_ns
+        self._add(*device_messages.REMARKS, log_ns, remark.time_ns, 0, device_messages.encode_remark(remark))
+
+    def write_clock(self, sync: ClockSync) -> None:
+        """Append how the clocks of this computer stand to each other."""
+        self._add(*device_messages.CLOCKS, sync.boot_ns, sync.boot_ns, 0, device_messages.encode_clock(sync))
+
     def write_update(self, lane: str, update: Update) -> None:
         """Append what an estimator said: its estimate (if valid) and the fates of the readings."""
         estimate, measurement = update.estimate, update.measurement
@@ -88,6 +103,12 @@ class RunWriter:
         if update.fates:
             fates = messages.encode_fates(measurement.time_ns, measurement.sensor, update.fates)
             self._add(FATES_TOPIC + lane, FATES, stamp, measurement.time_ns, measurement.seq, fates)
+
+    def copy(self, topic: str, schema: str, message: Message) -> None:
+        """Append a message of another log as it stands; raises `LogError` for a type that no log of ours holds."""
+        if schema not in SCHEMAS:
+            raise LogError(f"{self._path}: {topic} is of type {schema!r}, which is none of ours; leave that file out")
+        self._add(topic, schema, message.log_time, message.publish_time, message.sequence, message.data)
 
     def close(self) -> None:
         """Finish the file; nothing can be written afterwards."""

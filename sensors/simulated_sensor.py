@@ -150,6 +150,20 @@ class SimulatedMotors(SimulatedSensor):
 
     summary, kind = "motor commands of a simulated robot with single-channel encoders", MotorCommand
 
+    def open(self) -> DeviceInfo:
+        """As for all; the command that stands is told first, or nobody would know which way the wheels turn."""
+        info = super().open()
+        before = self._script[self._at - 1] if self._at else None
+        self._standing = before if isinstance(before, MotorCommand) else None
+        return info
+
+    def poll(self, timeout_s: float) -> Sequence[Said]:
+        """What fell due."""
+        if self._standing is None:
+            return super().poll(timeout_s)
+        standing, self._standing = self._standing, None
+        return [self._signed(replace(standing, time_ns=self._robot.elapsed_ns()))]
+
 
 class SimulatedGyro(SimulatedSensor):
     """A gyro."""

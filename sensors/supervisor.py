@@ -101,6 +101,10 @@ class Supervisor:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of all devices; what they said before can still be taken."""
         self._stopping.set()
         for thread in self._threads:
             thread.join(timeout=10.0 * TURN_S)  # one that its device holds up is left behind: it is a daemon

@@ -1,0 +1,58 @@
+"""Messages about the devices of a recording: what they remark, and how the clocks of its computer stand to each other.
+
+Kept apart from `logs.messages`: no estimator sees any of them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fusion import Level, Remark
+from logs.cdr import Unpacker
+from logs.messages import stamped, take_header
+
+REMARKS = ("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+CLOCKS = ("/clock_sync", "fusion_msgs/msg/ClockSync")
+
+
+class ClockSync(NamedTuple):
+    """The clocks of one computer at one moment [ns]. The stamps of its log count from boot: this says when that was."""
+
+    boot_ns: int
+    monotonic_ns: int
+    real_ns: int
+    ntp_synced: bool
+
+
+def encode_remark(remark: Remark) -> bytes:
+    """A remark as an array of one status."""
+    message = stamped(remark.time_ns, remark.sensor).put("I", 1).put("b", remark.level.value)
+    message.text(remark.sensor).text(remark.text).text("").put("I", len(remark.values))
+    for key, value in remark.values:
+        message.text(key).text(value)
+    return message.message()
+
+
+def decode_remark(data: bytes) -> Remark:
+    """A remark from its message."""
+    cursor = Unpacker(data)
+    time_ns, _ = take_header(cursor)
+    if (count := cursor.whole()) != 1:
+        raise ValueError(f"an array of {count} statuses is none of ours")
+    level, sensor, text = Level(min(cursor.whole("b"), Level.ERROR.value)), cursor.text(), cursor.text()
+    cursor.text()
+    return Remark(time_ns, sensor, level, text, tuple((cursor.text(), cursor.text()) for _ in range(cursor.whole())))
+
+
+def encode_clock(sync: ClockSync) -> bytes:
+    """The clocks of a moment."""
+    message = stamped(sync.boot_ns, "clock").put("q", sync.boot_ns, sync.monotonic_ns, sync.real_ns)
+    return message.put("?", sync.ntp_synced).message()
+
+
+def decode_clock(data: bytes) -> ClockSync:
+    """The clocks of a moment from their message."""
+    cursor = Unpacker(data)
+    take_header(cursor)
+    boot_ns, monotonic_ns, real_ns = (cursor.whole("q") for _ in range(3))
+    return ClockSync(boot_ns, monotonic_ns, real_ns, bool(cursor.whole("?")))

@@ -1,0 +1,58 @@
+"""The robot's own computer: its clocks, its boot, its free disk, its service manager."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import socket
+import time
+import uuid
+from pathlib import Path
+
+from logs.device_messages import ClockSync
+
+BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+NOT_SYNCHRONISED = 5
+"""TIME_ERROR, what adjtimex(2) answers while nothing keeps the clock right."""
+TIMEX_BYTES = 512
+"""More than a struct timex takes on any machine; all zero it only asks."""
+
+
+def clock_sync() -> ClockSync:
+    """The clocks as they stand now."""
+    boot_ns, monotonic_ns = time.clock_gettime_ns(time.CLOCK_BOOTTIME), time.monotonic_ns()
+    return ClockSync(boot_ns, monotonic_ns, time.time_ns(), is_clock_synced())
+
+
+def is_clock_synced() -> bool:
+    """Whether something (NTP, PTP, GPS) keeps the wall clock right, as the kernel has it."""
+    try:
+        return ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(TIMEX_BYTES)) not in (-1, NOT_SYNCHRONISED)
+    except (AttributeError, OSError):
+        return False  # no such call on this system: nobody vouches for the clock
+
+
+def boot_id() -> str:
+    """Eight letters that stay the same until the next boot, so that files of two boots never share a name."""
+    try:
+        return BOOT_ID.read_text()[:8]
+    except OSError:
+        return uuid.uuid4().hex[:8]
+
+
+def free_bytes(folder: Path) -> int:
+    """What a plain user may still write where ``folder`` is."""
+    return shutil.disk_usage(folder).free
+
+
+def tell_service_manager(message: str) -> None:
+    """Send ``READY=1``, ``WATCHDOG=1`` or ``STOPPING=1`` to systemd, where it started us (sd_notify(3))."""
+    address = os.environ.get("NOTIFY_SOCKET", "")
+    if not address:
+        return
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as link:
+        try:
+            link.sendto(message.encode(), address.replace("@", "\0", 1) if address.startswith("@") else address)
+        except OSError:
+            return  # the manager went away: it will notice by itself, and a recording goes on

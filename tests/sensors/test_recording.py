@@ -1,0 +1,250 @@
+"""A recording holds what every sensor said, whatever happens to sensors, disk and program."""
+
+import json
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from fusion import BootClock, LogError, NotFoundError
+from fusion.cli import main
+from fusion.values import Gyro, WheelTicks, WifiScan
+from logs.joining import join
+from logs.reader import read_run
+from sensors import split_log
+from sensors.recording import record
+from sensors.robot_file import RobotFile
+from tests.sensors.robot_files import robot_text
+
+LOST_AT_MOST_S = 1.2
+
+
+@pytest.fixture
+def robot(tmp_path):
+    def write(**options):
+        path = tmp_path / "trolley.toml"
+        path.write_text(robot_text(**options))
+        return RobotFile.load(path)
+
+    return write
+
+
+def recorded(robot, folder, duration_s, **options):
+    return record(robot, folder, stop=threading.Event(), duration_s=duration_s, **options)
+
+
+def launched(tmp_path, *words, **options):
+    """`fusion record` in a process of its own."""
+    path = tmp_path / "trolley.toml"
+    path.write_text(robot_text(**options))
+    command = [sys.executable, "-m", "fusion.cli", "record", str(path), "-o", str(tmp_path / "out"), *words]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def started(tmp_path, *words, **options):
+    """The same, once it writes: the first status line says that all sensors are open and the log is begun."""
+    process = launched(tmp_path, *words, **options)
+    process.stderr.readline()
+    return process
+
+
+def test_everything_the_sensors_said_is_in_the_log(robot, tmp_path):
+    done = recorded(robot(), tmp_path / "out", 2.5)
+    run = read_run(done.paths[0])
+    kinds = {kind: [m for m in run.measurements if isinstance(m, kind)] for kind in (WheelTicks, Gyro, WifiScan)}
+    said = {status.name: status.messages for status in done.statuses}
+    assert said["gyro"] == len(kinds[Gyro]) >= 100
+    assert said["encoders"] == len(kinds[WheelTicks]) >= 40
+    assert said["wifi"] == len(kinds[WifiScan]) >= 4
+    assert said["truth"] == len(run.truth)
+    assert run.prior is not None
+    assert done.trouble == ""
+    assert not run.warnings
+
+
+def test_the_log_tells_of_devices_clocks_and_how_sensors_do(robot, tmp_path):
+    run = read_run(recorded(robot(), tmp_path / "out", 1.5).paths[0])
+    opened = {remark.sensor: dict(remark.values) for remark in run.remarks if remark.text == "opened"}
+    assert json.loads(opened["gyro"]["settings"])["scenario"] == "room"
+    status = [dict(remark.values) for remark in run.remarks if remark.text == "status" and remark.sensor == "gyro"]
+    assert [row["state"] for row in status] == ["running"] * len(status)
+    assert len(status) >= 2
+    assert abs(run.clocks[0].real_ns - time.time_ns()) < 600e9
+    assert run.metadata["clock"] == "CLOCK_BOOTTIME"
+
+
+def test_splits_are_whole_logs_and_become_one_again(robot, tmp_path):
+    done = recorded(robot(record="min_free_mb = 0.0\nsplit_s = 1.0"), tmp_path / "out", 3.3)
+    parts = [read_run(path) for path in done.paths]
+    assert len(parts) >= 3
+    assert not [warning for part in parts for warning in part.warnings]
+    assert len({part.world.hash for part in parts}) == 1
+    assert all(part.clocks for part in parts)
+    assert all({r.sensor for r in part.remarks if r.text == "opened"} >= {"gyro", "wifi"} for part in parts)
+    assert [part.prior is not None for part in parts] == [True] + [False] * (len(parts) - 1)
+    assert join([tmp_path / "out"], tmp_path / "whole.mcap") == ()
+    whole = read_run(tmp_path / "whole.mcap")
+    assert list(whole.measurements) == [m for part in parts for m in part.measurements]
+    assert whole.prior == parts[0].prior
+    assert len(whole.remarks) == sum(len(part.remarks) for part in parts)
+
+
+def test_joining_names_what_is_missing_and_refuses_what_does_not_belong(robot, tmp_path):
+    one = robot(record="min_free_mb = 0.0\nsplit_s = 1.0")
+    done = recorded(one, tmp_path / "out", 2.6)
+    other = recorded(one, tmp_path / "out", 0.3)
+    first, second, *_ = done.paths
+    assert not set(done.paths) & set(other.paths)
+    second.unlink()
+    assert "part 1 is missing" in join(done.paths[:1] + done.paths[2:], tmp_path / "gap.mcap")[0]
+    with pytest.raises(LogError, match="2 recordings"):
+        join([tmp_path / "out"], tmp_path / "two.mcap")
+    with pytest.raises(LogError, match="there already"):
+        join([first], tmp_path / "gap.mcap")
+    with pytest.raises(LogError, match="give it once"):
+        join([first, first], tmp_path / "twice.mcap")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(LogError, match="no log is there"):
+        join([tmp_path / "empty"], tmp_path / "none.mcap")
+
+
+def test_a_sensor_that_is_unplugged_costs_itself_alone(robot, tmp_path):
+    faults = {"wifi": '{ kind = "unplug", from_s = 0.6, to_s = 1.4 }'}
+    run = read_run(recorded(robot(faults=faults), tmp_path / "out", 3.0).paths[0])
+    told = [remark for remark in run.remarks if remark.sensor == "wifi" and "unplugged" in remark.text]
+    told += [remark for remark in run.remarks if remark.sensor == "wifi" and "gone" in remark.text]
+    assert told
+    gyro = [m.time_ns for m in run.measurements if isinstance(m, Gyro)]
+    assert max(b - a for a, b in pairwise(gyro)) < 0.5e9
+    assert [m for m in run.measurements if isinstance(m, WifiScan)][-1].time_ns > gyro[0] + 2.0e9
+
+
+def test_a_required_sensor_that_is_missing_refuses_to_start_unless_told(robot, tmp_path):
+    gone = {"wifi": '{ kind = "unplug" }'}
+    with pytest.raises(NotFoundError, match=r"wifi: .*unplugged.*--degraded"):
+        recorded(robot(faults=gone), tmp_path / "out", 0.5, patience_s=0.3)
+    assert not list((tmp_path / "out").glob("*.mcap"))
+    assert recorded(robot(faults=gone), tmp_path / "out", 0.5, degraded=True).trouble == ""
+    optional = robot(faults=gone, required={"wifi": False})
+    assert recorded(optional, tmp_path / "out", 0.5, patience_s=0.3).trouble == ""
+
+
+def test_failing_fast_ends_with_the_reason(robot, tmp_path):
+    faults = {"gyro": '{ kind = "unplug", from_s = 0.5 }'}
+    done = recorded(robot(faults=faults), tmp_path / "out", 30.0, fail_fast=True)
+    assert "gyro" in done.trouble
+    assert done.duration_s < 20.0
+
+
+def test_a_disk_that_fills_up_ends_the_recording_cleanly(robot, tmp_path, monkeypatch):
+    full = threading.Event()
+    monkeypatch.setattr(split_log, "free_bytes", lambda _: 1e6 if full.is_set() else 1e12)
+    done = recorded(robot(record="min_free_mb = 100.0"), tmp_path / "out", 60.0, tell=lambda _: full.set())
+    assert "nearly full: 99 MB less" in done.trouble
+    assert not read_run(done.paths[0]).warnings
+    with pytest.raises(LogError, match="remove something"):
+        recorded(robot(record="min_free_mb = 100.0"), tmp_path / "out", 1.0)
+
+
+def test_a_ring_gives_up_the_oldest_files_of_its_robot_only(robot, tmp_path, monkeypatch):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for age, name in enumerate(
+        ("trolley-aaaaaaaa-0000.mcap", "other-aaaaaaaa-0000.mcap", "trolley-aaaaaaaa-0001.mcap")
+    ):
+        (folder / name).write_bytes(b"x")
+        os.utime(folder / name, ns=(age, age))
+    monkeypatch.setattr(split_log, "free_bytes", lambda _: 1e9 if len(list(folder.iterdir())) <= 3 else 0)
+    done = recorded(robot(record="min_free_mb = 100.0\nring = true"), folder, 0.5)
+    assert done.trouble == ""
+    assert not (folder / "trolley-aaaaaaaa-0000.mcap").exists()
+    assert (folder / "other-aaaaaaaa-0000.mcap").exists()
+    assert (folder / "trolley-aaaaaaaa-0001.mcap").exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a tmpfs needs root")
+def test_a_disk_that_is_full_all_the_same_loses_nothing_that_is_on_it(tmp_path):
+    small = tmp_path / "out"
+    small.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(small)], check=False)
+    if mounted.returncode:
+        pytest.skip("this machine mounts no tmpfs")
+    try:
+        process = started(tmp_path, "--min-free", "0", "--duration", "60")
+        _, err = process.communicate(timeout=120)
+        assert process.returncode == 1
+        assert "free some space" in err
+        run = read_run(next(small.glob("*.mcap")))
+        assert len(run.measurements) > 100
+    finally:
+        subprocess.run(["umount", str(small)], check=True)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_gives_a_whole_file(tmp_path, number):
+    process = started(tmp_path)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 0, err
+    run = read_run(Path(out.split()[-1]))
+    assert not run.warnings
+    assert run.measurements
+
+
+def test_the_service_manager_hears_that_it_is_ready_alive_and_stopping(tmp_path, monkeypatch):
+    import socket
+
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        manager.settimeout(20.0)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        process = started(tmp_path, "--duration", "1.5")
+        process.communicate(timeout=30)
+        heard = [manager.recv(100)]
+        while heard[-1] != b"STOPPING=1":
+            heard.append(manager.recv(100))
+    assert heard[0] == b"READY=1"
+    assert b"WATCHDOG=1" in heard
+    assert heard[-1] == b"STOPPING=1"
+
+
+def test_killed_at_any_moment_it_loses_a_second_and_no_more(tmp_path):
+    """Fifty times, five at once, each at a moment of its own."""
+    moments, losses = random.Random(1), []
+    for batch in range(10):
+        folders = [tmp_path / f"{batch}-{number}" for number in range(5)]
+        for folder in folders:
+            folder.mkdir()
+        running = [launched(folder, record="min_free_mb = 0.0\nsplit_s = 1.5") for folder in folders]
+        for folder, process in zip(folders, running, strict=True):
+            process.stderr.readline()
+            time.sleep(moments.uniform(0.0, 0.4))
+            killed_ns = BootClock().now_ns()
+            process.kill()
+            process.communicate()
+            runs = [read_run(path) for path in sorted((folder / "out").glob("*.mcap"))]
+            last_ns = max((m.time_ns for run in runs for m in run.measurements), default=runs[0].prior.time_ns)
+            losses.append((killed_ns - last_ns) / 1e9)
+    assert len(losses) == 50
+    assert max(losses) <= LOST_AT_MOST_S, sorted(losses)[-5:]
+
+
+def test_the_command_says_what_is_wrong_in_one_sentence(tmp_path, capsys):
+    path = tmp_path / "trolley.toml"
+    path.write_text(robot_text().replace("simulated_gyro", "simulated_giro"))
+    assert main(["record", str(path), "-o", str(tmp_path / "out")]) == 1
+    assert "did you mean 'simulated_gyro'" in capsys.readouterr().err
+    path.write_text(robot_text())
+    assert main(["record", str(path), "-o", str(path)]) == 1
+    assert "choose another place" in capsys.readouterr().err
+    assert main(["record", str(path), "-o", str(tmp_path / "out"), "--duration", "0.6", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert re.search(r"trolley-\w{8}-0000\.mcap", told["paths"][0])
