@@ -5,6 +5,7 @@ Everything a user or plug-in author needs is imported from here; estimators and 
 
 from fusion.certificate import digest
 from fusion.driver import (
+    Advice,
     BootClock,
     Clock,
     DeviceInfo,
@@ -67,6 +68,7 @@ from fusion.world import Anchor, Bounds, OdometryNoise, Robot, World
 __version__ = "0.1.0"
 
 __all__ = [
+    "Advice",
     "Anchor",
     "BootClock",
     "Bounds",

@@ -27,6 +27,8 @@ VERBS = {
     "demo": Verb("benchmarks.demo", "the whole promise in one command: simulate, record, score, show"),
     "simulate": Verb("sensors.simulate", "drive a simulated robot and record it as an MCAP log"),
     "record": Verb("sensors.record", "the sensors of a robot into logs, until somebody says stop"),
+    "doctor": Verb("sensors.doctor", "everything a recording needs, and the cure for what is wrong"),
+    "sensors": Verb("sensors.devices", "what drivers are installed, and which devices are there"),
     "join": Verb("logs.joining", "the files of one recording become one log"),
     "import": Verb("logs.importing", "turn a recording of another format into an MCAP log"),
     "export": Verb("logs.export", "turn a log into CSV or TUM files"),
@@ -52,6 +54,7 @@ GROUPS = {
         "verify": Verb("benchmarks.runner.verify_verb", "compute stored cells again, they must be the same"),
         "export": Verb("benchmarks.runner.export_verb", "results for other programs"),
     },
+    "sensors": {"test": Verb("sensors.self_test", "run every sensor of a robot for a while: a report to attach")},
 }
 """Verbs under verbs; without one of them the verb itself is meant (`fusion bench RUN`)."""
 

@@ -57,6 +57,17 @@ class DeviceInfo(NamedTuple):
     settings: Mapping[str, object] = MappingProxyType({})
 
 
+class Advice(NamedTuple):
+    """One thing that `fusion doctor` looked at: how it stands, and what to do if it should be otherwise.
+
+    A driver may offer ``advise()``, which answers a list of them and neither opens nor changes its device.
+    """
+
+    is_well: bool
+    what: str
+    cure: str = ""
+
+
 @unique
 class Level(Enum):
     """How much a remark matters; the values are those of diagnostic_msgs/DiagnosticStatus."""
