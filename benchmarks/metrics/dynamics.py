@@ -41,6 +41,8 @@ def stretches(mask: Flags, run: Whole) -> Stretches:
     """The longest stretches of instants where ``mask`` (n,) is True, none reaching over two runs."""
     if len(mask) == 0 or not mask.any():
         return Stretches(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+    if mask.all() and run[0] == run[-1]:
+        return Stretches(np.array([0]), np.array([len(mask) - 1]))
     breaks = np.flatnonzero((mask[1:] != mask[:-1]) | (run[1:] != run[:-1])) + 1
     first = np.concatenate([[0], breaks])
     last = np.concatenate([breaks - 1, [len(mask) - 1]])
