@@ -17,11 +17,13 @@ from benchmarks.metrics.track import Flags, Floats
 
 AUC_RADIUS_M = 3.0
 POSITION_QUANTILES = {"pos_p50": 0.50, "pos_p75": 0.75, "pos_p90": 0.90, "pos_p95": 0.95, "pos_p99": 0.99}
+CDF_RADII_M = {"10cm": 0.1, "30cm": 0.3, "50cm": 0.5, "1m": 1.0, "2m": 2.0, "3m": 3.0}
+"""By the ends of their ids."""
 GREATEST = float(np.finfo(np.float64).max)
 
 
 def position_metrics(measured: Errors) -> dict[str, float]:
-    """Mean, RMSE, spread, quantiles and their 95 % intervals, and the area under the distribution function up to 3 m.
+    """Mean, RMSE, spread, quantiles and their 95 % intervals, distribution function and the area under it to 3 m.
 
     ``availability`` is the share of instants with a valid answer.
     """
@@ -40,9 +42,16 @@ def position_metrics(measured: Errors) -> dict[str, float]:
         "pos_min": float(valid.min()) if len(valid) else math.nan,
         "pos_max": float(valid.max()) if len(valid) else math.nan,
         "pos_auc": mean(np.maximum(0.0, 1.0 - position / AUC_RADIUS_M), weight),
+        **_within(position, weight),
         **found,
         **_quantile_intervals(measured, ordered, found),
     }
+
+
+def _within(position: Floats, weight: Floats | None) -> dict[str, float]:
+    """``pos_cdf_1m`` and so on: the distribution function of the error, F(r), at named radii."""
+    inside = position <= np.array([*CDF_RADII_M.values()])[:, None]
+    return {f"pos_cdf_{name}": share for name, share in zip(CDF_RADII_M, means(inside, weight), strict=True)}
 
 
 def _quantile_intervals(measured: Errors, ordered: Ordered, found: dict[str, float]) -> dict[str, float]:

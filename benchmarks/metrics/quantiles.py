@@ -23,12 +23,16 @@ def weighted(values: Floats | NDArray[np.bool_], weight: Floats) -> float:
     return float(weight @ values / np.add.reduce(weight))
 
 
-def means(rows: Floats, weight: Floats | None = None) -> list[float]:
+def means(rows: Floats | NDArray[np.bool_], weight: Floats | None = None) -> list[float]:
     """The mean of each row of (k, n), values counting ``weight`` (n,) times (None: once); NaN of nothing."""
     count = rows.shape[1]
     if count == 0:
         return [math.nan] * len(rows)
-    sums = np.add.reduce(rows, axis=1) / count if weight is None else rows @ weight / np.add.reduce(weight)
+    sums = (
+        np.add.reduce(rows, axis=1, dtype=np.float64) / count
+        if weight is None
+        else rows @ weight / np.add.reduce(weight)
+    )
     return list(sums.tolist())
 
 
