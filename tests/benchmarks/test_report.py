@@ -74,7 +74,9 @@ def test_page_holds_verdicts_tables_figures_and_provenance(material):
 def test_cost_is_drawn_once_it_was_measured(place, capsys):
     words = [str(place / "suite.toml"), "--store", str(place / "store")]
     assert main(["bench", "time", *words, "--repeats", "1"]) == 0
-    assert "wheels" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "wheels" in printed
+    assert "peak MB" in printed
     suite, store = load_suite(place / "suite.toml"), Store(place / "store")
     timed = Material(suite, read_results(cells_of(suite, store), store), store)
     assert timed.timing.keys() == {"wheels", "radio"}
