@@ -107,10 +107,9 @@ def _outage(measured: Errors, first: int, last: int) -> tuple[float, float, floa
     valid = np.isfinite(inside)
     seconds = (measured.time_ns[first : last + 1][valid] - measured.time_ns[first]) / NANOSECONDS
     peak = float(inside[valid].max()) if valid.any() else math.nan
-    rest = measured._replace(**{name: column[last + 1 :] for name, column in measured._asdict().items()})
-    rest_of_run = rest.position[rest.run == measured.run[last]]
-    rest_ns = rest.time_ns[: len(rest_of_run)]
-    held = stretches(rest_of_run <= CONVERGED_M, rest.run[: len(rest_of_run)]).lasting(rest_ns, CONVERGED_S)
+    rest = slice(last + 1, last + 1 + int(np.count_nonzero(measured.run[last + 1 :] == measured.run[last])))
+    rest_ns = measured.time_ns[rest]
+    held = stretches(measured.position[rest] <= CONVERGED_M, measured.run[rest]).lasting(rest_ns, CONVERGED_S)
     recovered = (rest_ns[held.first[0]] - measured.time_ns[last]) / NANOSECONDS if len(held.first) else math.inf
     return float(recovered), peak, theil_sen(seconds, inside[valid])
 

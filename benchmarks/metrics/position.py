@@ -27,7 +27,7 @@ def position_metrics(measured: Errors) -> dict[str, float]:
 
     ``availability`` is the share of instants with a valid answer.
     """
-    weight, position = measured.weights, measured.position
+    weight, position = measured.weight, measured.position
     valid, own = _where(np.isfinite(position), position, weight)
     centre = mean(valid, own)
     ordered = Ordered.of(position, weight)
@@ -79,7 +79,7 @@ def axis_metrics(measured: Errors) -> dict[str, float]:
     Where errors are Gaussian and alike in all directions, a mean of ``abs_x`` is 36 % below ``pos_mean``: never compare
     one with the other.
     """
-    error, weight = _where(np.isfinite(measured.position), np.array([measured.dx, measured.dy]), measured.weights)
+    error, weight = _where(np.isfinite(measured.position), np.array([measured.dx, measured.dy]), measured.weight)
     if error.shape[1] == 0:
         return dict.fromkeys(AXIS_IDS, math.nan)
     size = np.abs(error)
@@ -102,9 +102,9 @@ def track_metrics(measured: Errors) -> dict[str, float]:
     cos, sin = np.cos(measured.true_heading), np.sin(measured.true_heading)
     error = np.array([cos * measured.dx + sin * measured.dy, cos * measured.dy - sin * measured.dx])
     there = np.isfinite(error[0])
-    valid, own = _where(there, error, measured.weights)
+    valid, own = _where(there, error, measured.weight)
     asked = np.isfinite(measured.true_heading)
-    size, weight = _where(asked, np.where(there, np.abs(error), np.inf), measured.weights)
+    size, weight = _where(asked, np.where(there, np.abs(error), np.inf), measured.weight)
     of_both = (root_mean_squares(valid, own), means(valid, own), quantiles(size, 0.95, weight))
     named = zip(("rmse", "bias", "p95"), of_both, strict=True)
     return {f"{side}_{what}": one for what, both in named for side, one in zip(("along", "cross"), both, strict=True)}
@@ -112,7 +112,7 @@ def track_metrics(measured: Errors) -> dict[str, float]:
 
 def heading_metrics(measured: Errors) -> dict[str, float]:
     """Of absolute heading errors [rad]; all NaN for a method, or a truth, that never tells a heading."""
-    asked, weight = _where(~np.isnan(measured.heading), measured.heading, measured.weights)
+    asked, weight = _where(~np.isnan(measured.heading), measured.heading, measured.weight)
     valid, own = _where(np.isfinite(asked), asked, weight)
     return {
         "head_mae": mean(valid, own),
