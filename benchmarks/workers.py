@@ -197,13 +197,13 @@ def _serve(connection: Connection, work: Callable[[Any], Any], rss_mb: float | N
 
 def _watch_memory(rss_mb: float) -> NoReturn:
     """End the process once it has ever held more than it may."""
-    while _peak_rss_bytes() <= rss_mb * 2**20:
+    while peak_rss_bytes() <= rss_mb * 2**20:
         time.sleep(WATCH_S)
     os._exit(OUT_OF_MEMORY)
 
 
-def _peak_rss_bytes() -> int:
-    """The most memory that was ever resident. Linux's own resource usage would count what the parent held, too."""
+def peak_rss_bytes() -> int:
+    """The most memory that this process ever held. Linux's own resource usage would count what the parent held, too."""
     try:
         lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
         return 1024 * int(next(line for line in lines if line.startswith("VmHWM")).split()[1])

@@ -178,10 +178,10 @@ def rssi_fix_bound(world: World, x: float, y: float, heading: float = 0.0) -> Fl
 
 
 def eff_crlb(error_m: Floats, bound_m: Floats) -> float:
-    """Efficiency of static fixes: root mean square bound over RMSE, at most 1 for an unbiased method; (n,), (n,) [m].
+    """Efficiency of fixes: root mean square bound over RMSE, at most 1 for an unbiased method; (n,), (n,) [m].
 
     Fixes that failed (infinite) and places where the bound is undefined are left out: read it beside the availability.
-    NaN where nothing is left. Above 1, a prior, tuning on the test data or a fault is at work.
+    NaN where nothing is left. Above 1, motion, a prior, tuning on the test data or a fault is at work.
     """
     counted = np.isfinite(error_m) & np.isfinite(bound_m)
     if not counted.any() or not error_m[counted].any():

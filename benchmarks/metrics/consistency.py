@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from benchmarks.metrics.deviation import Errors
-from benchmarks.metrics.quantiles import mean
+from benchmarks.metrics.quantiles import mean, means
 from benchmarks.metrics.samples import binomial_interval, effective_sizes, mean_chi_square_band
 from benchmarks.metrics.track import Flags, Floats, Whole
 
@@ -49,5 +49,7 @@ def _bands(nees: Floats, dimension: Floats, hit: Flags, run: Whole) -> dict[str,
 
 def distribution_metrics(measured: Errors) -> dict[str, float]:
     """Proper scores, means over the instants with a claim, smaller is better: see `benchmarks.metrics.claims`."""
-    columns = {"nll_3d": measured.nll, "nll_2d": measured.nll_2d, "energy": measured.energy}
-    return {name: mean(column[~np.isnan(column)]) for name, column in columns.items()}
+    names, columns = ("nll_3d", "nll_2d", "energy"), np.array([measured.nll, measured.nll_2d, measured.energy])
+    if not np.isnan(columns).any():
+        return dict(zip(names, means(columns), strict=True))
+    return {name: mean(column[~np.isnan(column)]) for name, column in zip(names, columns, strict=True)}

@@ -22,7 +22,7 @@ class Errors(NamedTuple):
     ``dx``, ``dy`` [m], map frame, and ``turn`` [rad]: answer minus truth, NaN where there is none. ``x``, ``y``,
     ``true_heading``: the truth. ``nll``, ``nll_2d`` [nat] and ``energy`` [m]: see `benchmarks.metrics.claims.Claims`.
     ``age_s``, ``since_fix_s``: see `Answers`. ``weight``: how often the instant counts in means and quantiles of
-    errors. ``run`` numbers the runs that were pooled; within each, time rises.
+    errors, None where all count alike. ``run`` numbers the runs that were pooled; within each, time rises.
     """
 
     position: Floats
@@ -42,13 +42,8 @@ class Errors(NamedTuple):
     energy: Floats
     age_s: Floats
     since_fix_s: Floats
-    weight: Floats
+    weight: Floats | None
     run: Whole
-
-    @property
-    def weights(self) -> Floats | None:
-        """``weight``, or None where all count alike."""
-        return None if len(self.weight) == 0 or self.weight.min() == self.weight.max() else self.weight
 
 
 def errors(instants: Instants, answers: Answers, weight: Floats | None = None) -> Errors:
@@ -77,14 +72,20 @@ def errors(instants: Instants, answers: Answers, weight: Floats | None = None) -
         energy=claims.energy,
         age_s=answers.age_s,
         since_fix_s=answers.since_fix_s,
-        weight=np.ones(len(dx)) if weight is None else weight,
+        weight=weight,
         run=np.zeros(len(dx), dtype=np.int64),
     )
 
 
 def pool(parts: Sequence[Errors]) -> Errors:
     """All instants of all parts together, each part a run of its own."""
-    together = Errors(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    weighed = any(part.weight is not None for part in parts)
+    alike = [part._replace(weight=_weight(part)) for part in parts]
+    together = Errors(*(np.concatenate(columns) for columns in zip(*alike, strict=True)))
     offsets = np.cumsum([0, *(int(part.run.max(initial=-1)) + 1 for part in parts[:-1])])
     runs = [part.run + offset for part, offset in zip(parts, offsets, strict=True)]
-    return together._replace(run=np.concatenate(runs))
+    return together._replace(run=np.concatenate(runs), weight=together.weight if weighed else None)
+
+
+def _weight(part: Errors) -> Floats:
+    return np.ones(len(part.position)) if part.weight is None else part.weight

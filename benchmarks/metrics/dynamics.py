@@ -41,6 +41,8 @@ def stretches(mask: Flags, run: Whole) -> Stretches:
     """The longest stretches of instants where ``mask`` (n,) is True, none reaching over two runs."""
     if len(mask) == 0 or not mask.any():
         return Stretches(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+    if mask.all() and run[0] == run[-1]:
+        return Stretches(np.array([0]), np.array([len(mask) - 1]))
     breaks = np.flatnonzero((mask[1:] != mask[:-1]) | (run[1:] != run[:-1])) + 1
     first = np.concatenate([[0], breaks])
     last = np.concatenate([breaks - 1, [len(mask) - 1]])
@@ -105,10 +107,9 @@ def _outage(measured: Errors, first: int, last: int) -> tuple[float, float, floa
     valid = np.isfinite(inside)
     seconds = (measured.time_ns[first : last + 1][valid] - measured.time_ns[first]) / NANOSECONDS
     peak = float(inside[valid].max()) if valid.any() else math.nan
-    rest = measured._replace(**{name: column[last + 1 :] for name, column in measured._asdict().items()})
-    rest_of_run = rest.position[rest.run == measured.run[last]]
-    rest_ns = rest.time_ns[: len(rest_of_run)]
-    held = stretches(rest_of_run <= CONVERGED_M, rest.run[: len(rest_of_run)]).lasting(rest_ns, CONVERGED_S)
+    rest = slice(last + 1, last + 1 + int(np.count_nonzero(measured.run[last + 1 :] == measured.run[last])))
+    rest_ns = measured.time_ns[rest]
+    held = stretches(measured.position[rest] <= CONVERGED_M, measured.run[rest]).lasting(rest_ns, CONVERGED_S)
     recovered = (rest_ns[held.first[0]] - measured.time_ns[last]) / NANOSECONDS if len(held.first) else math.inf
     return float(recovered), peak, theil_sen(seconds, inside[valid])
 

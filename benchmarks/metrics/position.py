@@ -11,22 +11,24 @@ import math
 import numpy as np
 
 from benchmarks.metrics.deviation import Errors
-from benchmarks.metrics.quantiles import Ordered, mean, quantile, root_mean_square
+from benchmarks.metrics.quantiles import Ordered, mean, means, quantile, quantiles, root_mean_square, root_mean_squares
 from benchmarks.metrics.samples import effective_sizes, order_shares
-from benchmarks.metrics.track import Floats
+from benchmarks.metrics.track import Flags, Floats
 
 AUC_RADIUS_M = 3.0
 POSITION_QUANTILES = {"pos_p50": 0.50, "pos_p75": 0.75, "pos_p90": 0.90, "pos_p95": 0.95, "pos_p99": 0.99}
+CDF_RADII_M = {"10cm": 0.1, "30cm": 0.3, "50cm": 0.5, "1m": 1.0, "2m": 2.0, "3m": 3.0}
+"""By the ends of their ids."""
 GREATEST = float(np.finfo(np.float64).max)
 
 
 def position_metrics(measured: Errors) -> dict[str, float]:
-    """Mean, RMSE, spread, quantiles and their 95 % intervals, and the area under the distribution function up to 3 m.
+    """Mean, RMSE, spread, quantiles and their 95 % intervals, distribution function and the area under it to 3 m.
 
     ``availability`` is the share of instants with a valid answer.
     """
-    weight, position = measured.weights, measured.position
-    valid, own = _finite(position, weight)
+    weight, position = measured.weight, measured.position
+    valid, own = _where(np.isfinite(position), position, weight)
     centre = mean(valid, own)
     ordered = Ordered.of(position, weight)
     found = {name: ordered.quantile(share) for name, share in POSITION_QUANTILES.items()}
@@ -40,9 +42,16 @@ def position_metrics(measured: Errors) -> dict[str, float]:
         "pos_min": float(valid.min()) if len(valid) else math.nan,
         "pos_max": float(valid.max()) if len(valid) else math.nan,
         "pos_auc": mean(np.maximum(0.0, 1.0 - position / AUC_RADIUS_M), weight),
+        **_within(position, weight),
         **found,
         **_quantile_intervals(measured, ordered, found),
     }
+
+
+def _within(position: Floats, weight: Floats | None) -> dict[str, float]:
+    """``pos_cdf_1m`` and so on: the distribution function of the error, F(r), at named radii."""
+    inside = position <= np.array([*CDF_RADII_M.values()])[:, None]
+    return {f"pos_cdf_{name}": share for name, share in zip(CDF_RADII_M, means(inside, weight), strict=True)}
 
 
 def _quantile_intervals(measured: Errors, ordered: Ordered, found: dict[str, float]) -> dict[str, float]:
@@ -51,8 +60,11 @@ def _quantile_intervals(measured: Errors, ordered: Ordered, found: dict[str, flo
     ``n_eff`` is the effective sample size of the error, cut off at 3 m; each quantile's is that of being below it.
     """
     position = measured.position
-    below = [position <= min(value, GREATEST) for value in found.values()]
-    sizes = effective_sizes(np.array([np.minimum(position, AUC_RADIUS_M), *below]), measured.run)
+    limits = np.minimum(list(found.values()), GREATEST)
+    series = np.empty((1 + len(limits), len(position)))
+    series[0] = np.minimum(position, AUC_RADIUS_M)
+    series[1:] = position <= limits[:, None]
+    sizes = effective_sizes(series, measured.run)
     own, *others = sizes.tolist()
     scores = {"n_eff": own}
     for (name, share), samples in zip(POSITION_QUANTILES.items(), others, strict=True):
@@ -67,19 +79,16 @@ def axis_metrics(measured: Errors) -> dict[str, float]:
     Where errors are Gaussian and alike in all directions, a mean of ``abs_x`` is 36 % below ``pos_mean``: never compare
     one with the other.
     """
-    there = np.isfinite(measured.position)
-    if not there.any():
+    error, weight = _where(np.isfinite(measured.position), np.array([measured.dx, measured.dy]), measured.weight)
+    if error.shape[1] == 0:
         return dict.fromkeys(AXIS_IDS, math.nan)
-    weight = None if measured.weights is None else measured.weights[there]
-    dx, dy = measured.dx[there], measured.dy[there]
-    abs_x, abs_y = np.abs(dx), np.abs(dy)
-    bias_x, bias_y = mean(dx, weight), mean(dy, weight)
-    from_x, from_y = dx - bias_x, dy - bias_y
-    xx, xy, yy = mean(from_x * from_x, weight), mean(from_x * from_y, weight), mean(from_y * from_y, weight)
-    of_x = mean(abs_x, weight), float(abs_x.max()), float(abs_x.min())
-    of_y = mean(abs_y, weight), float(abs_y.max()), float(abs_y.min())
+    size = np.abs(error)
+    bias = means(error, weight)
+    from_x, from_y = error - np.array(bias)[:, None]
+    xx, xy, yy = means(np.array([from_x * from_x, from_x * from_y, from_y * from_y]), weight)
+    of_x, of_y = zip(means(size, weight), size.max(axis=1).tolist(), size.min(axis=1).tolist(), strict=True)
     drms = math.sqrt(xx + yy)
-    return dict(zip(AXIS_IDS, (*of_x, *of_y, bias_x, bias_y, xx, xy, yy, drms, 2.0 * drms), strict=True))
+    return dict(zip(AXIS_IDS, (*of_x, *of_y, *bias, xx, xy, yy, drms, 2.0 * drms), strict=True))
 
 
 AXIS_IDS = (
@@ -90,26 +99,21 @@ AXIS_IDS = (
 
 def track_metrics(measured: Errors) -> dict[str, float]:
     """Errors along the true heading, forward positive, and across it, left positive: RMSE, bias, p95 of the size."""
+    cos, sin = np.cos(measured.true_heading), np.sin(measured.true_heading)
+    error = np.array([cos * measured.dx + sin * measured.dy, cos * measured.dy - sin * measured.dx])
+    there = np.isfinite(error[0])
+    valid, own = _where(there, error, measured.weight)
     asked = np.isfinite(measured.true_heading)
-    weight = None if measured.weights is None else measured.weights[asked]
-    cos, sin = np.cos(measured.true_heading[asked]), np.sin(measured.true_heading[asked])
-    dx, dy = measured.dx[asked], measured.dy[asked]
-    scores = {}
-    for name, error in (("along", cos * dx + sin * dy), ("cross", cos * dy - sin * dx)):
-        valid, own = _finite(error, weight)
-        size = np.where(np.isfinite(error), np.abs(error), np.inf)
-        scores[f"{name}_rmse"] = root_mean_square(valid, own)
-        scores[f"{name}_bias"] = mean(valid, own)
-        scores[f"{name}_p95"] = quantile(size, 0.95, weight)
-    return scores
+    size, weight = _where(asked, np.where(there, np.abs(error), np.inf), measured.weight)
+    of_both = (root_mean_squares(valid, own), means(valid, own), quantiles(size, 0.95, weight))
+    named = zip(("rmse", "bias", "p95"), of_both, strict=True)
+    return {f"{side}_{what}": one for what, both in named for side, one in zip(("along", "cross"), both, strict=True)}
 
 
 def heading_metrics(measured: Errors) -> dict[str, float]:
     """Of absolute heading errors [rad]; all NaN for a method, or a truth, that never tells a heading."""
-    known = ~np.isnan(measured.heading)
-    asked = measured.heading[known]
-    weight = None if measured.weights is None else measured.weights[known]
-    valid, own = _finite(asked, weight)
+    asked, weight = _where(~np.isnan(measured.heading), measured.heading, measured.weight)
+    valid, own = _where(np.isfinite(asked), asked, weight)
     return {
         "head_mae": mean(valid, own),
         "head_rmse": root_mean_square(valid, own),
@@ -117,7 +121,8 @@ def heading_metrics(measured: Errors) -> dict[str, float]:
     }
 
 
-def _finite(values: Floats, weight: Floats | None) -> tuple[Floats, Floats | None]:
-    """The finite values and their weights."""
-    kept = np.isfinite(values)
-    return values[kept], None if weight is None else weight[kept]
+def _where(kept: Flags, values: Floats, weight: Floats | None) -> tuple[Floats, Floats | None]:
+    """The columns of ``values`` (..., n) that are ``kept`` (n,), and their weights; most often that is all of them."""
+    if kept.all():
+        return values, weight
+    return values[..., kept], None if weight is None else weight[kept]

@@ -23,9 +23,27 @@ def weighted(values: Floats | NDArray[np.bool_], weight: Floats) -> float:
     return float(weight @ values / np.add.reduce(weight))
 
 
+def means(rows: Floats | NDArray[np.bool_], weight: Floats | None = None) -> list[float]:
+    """The mean of each row of (k, n), values counting ``weight`` (n,) times (None: once); NaN of nothing."""
+    count = rows.shape[1]
+    if count == 0:
+        return [math.nan] * len(rows)
+    sums = (
+        np.add.reduce(rows, axis=1, dtype=np.float64) / count
+        if weight is None
+        else rows @ weight / np.add.reduce(weight)
+    )
+    return list(sums.tolist())
+
+
 def root_mean_square(values: Floats, weight: Floats | None = None) -> float:
     """The root of the mean square; NaN of nothing."""
     return math.sqrt(mean(values * values, weight))
+
+
+def root_mean_squares(rows: Floats, weight: Floats | None = None) -> list[float]:
+    """The root of the mean square of each row of (k, n)."""
+    return [math.sqrt(square) for square in means(rows * rows, weight)]
 
 
 def quantile(values: Floats, share: float, weight: Floats | None = None) -> float:
@@ -33,7 +51,33 @@ def quantile(values: Floats, share: float, weight: Floats | None = None) -> floa
 
     ``numpy.percentile`` answers NaN for the median of (1, 2, inf), for it computes 0 * inf.
     """
-    return Ordered.of(values, weight).quantile(share)
+    return quantiles(values[None], share, weight)[0]
+
+
+def quantiles(rows: Floats, share: float, weight: Floats | None = None) -> list[float]:
+    """The `quantile` of each row of (k, n)."""
+    count = rows.shape[1]
+    if weight is not None or count == 0:
+        return [Ordered.of(row, weight).quantile(share) for row in rows]
+    # One value in its place, and the least of those above it, cost half of putting all in order.
+    below, part = _place((count - 1) * share)
+    split = np.partition(rows, below, axis=1)
+    lows = split[:, below].tolist()
+    highs = np.minimum.reduce(split[:, below + 1 :], axis=1).tolist() if part else lows
+    return [_between(low, high, part) for low, high in zip(lows, highs, strict=True)]
+
+
+def _place(place: float) -> tuple[int, float]:
+    """The index below a place among values in order, and the part of the way to the next one."""
+    below = int(place)
+    return below, place - below
+
+
+def _between(low: float, high: float, part: float) -> float:
+    """That part of the way from ``low`` to ``high``, either of which may be infinite."""
+    if part == 0.0 or low == math.inf:
+        return low
+    return math.inf if high == math.inf else low + part * (high - low)
 
 
 class Ordered(NamedTuple):
@@ -62,9 +106,5 @@ class Ordered(NamedTuple):
         if count == 0:
             return math.nan
         place = (count - 1) * share if self.stands is None else float(np.interp(share, self.stands, np.arange(count)))
-        below = int(place)
-        part = place - below
-        low, high = self.values[below].item(), self.values[min(below + 1, count - 1)].item()
-        if part == 0.0 or low == math.inf:
-            return float(low)
-        return math.inf if high == math.inf else float(low + part * (high - low))
+        below, part = _place(place)
+        return _between(self.values[below].item(), self.values[min(below + 1, count - 1)].item(), part)

@@ -37,24 +37,27 @@ def effective_sizes(series: Floats, run: Whole) -> Floats:
 
 
 def _of_one_run(series: Floats) -> Floats:
+    spans = np.maximum.reduce(series, axis=1) - np.minimum.reduce(series, axis=1)
+    changing = np.flatnonzero(spans)
+    sizes = np.ones(len(series))
     at_once = max(BATCH // series.shape[1], 1)
-    sizes = np.concatenate([_of_rows(series[row : row + at_once]) for row in range(0, len(series), at_once)])
-    return np.asarray(np.where(np.isnan(sizes), 1.0 if np.isnan(sizes[0]) else sizes[0], sizes))
+    for first in range(0, len(changing), at_once):
+        rows = changing[first : first + at_once]
+        sizes[rows] = _of_rows(series[rows] / spans[rows, None])
+    if len(changing) and changing[0] == 0:
+        sizes[spans == 0.0] = sizes[0]
+    return sizes
 
 
 def _of_rows(series: Floats) -> Floats:
-    """NaN for a row that never changes. Autocorrelations by the fast Fourier transform (Wiener & Khinchin)."""
+    """Autocorrelations by the fast Fourier transform (Wiener & Khinchin)."""
     count = series.shape[1]
-    spans = np.ptp(series, axis=1)
-    changing = series[spans > 0.0]
-    scaled = (changing - changing.mean(axis=1, keepdims=True)) / spans[spans > 0.0, None]
+    centred = series - np.add.reduce(series, axis=1, keepdims=True) / count
     lags = max(count // 4 * 2, 2)
     length = min(small << max((count + lags - 1) // small, 1).bit_length() for small in (4, 5, 6))
-    spectrum = np.fft.rfft(scaled, length)
+    spectrum = np.fft.rfft(centred, length)
     covariance = np.fft.irfft(spectrum.real**2 + spectrum.imag**2, length)[:, :lags]
-    sizes = np.full(len(series), np.nan)
-    sizes[spans > 0.0] = count / _time(covariance)
-    return sizes
+    return np.asarray(count / _time(covariance))
 
 
 def _time(covariance: Floats) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.metrics.deviation import Errors
-from benchmarks.metrics.quantiles import mean, quantile, root_mean_square
+from benchmarks.metrics.quantiles import mean, quantile, quantiles, root_mean_squares
 from benchmarks.metrics.track import Floats, Whole
 from fusion.values import NANOSECONDS, nanoseconds
 
@@ -43,28 +43,30 @@ def trajectory_metrics(measured: Errors, *, top_speed_m_s: float = TOP_SPEED_M_S
 def relative_pose_metrics(measured: Errors) -> dict[str, float]:
     """``rpe_d_1m_rmse`` ... ``rpe_t_10s_rot_median``: RMSE and median of translation [m] and ``rot``ation [rad].
 
-    From every instant to the first one after at least 1, 5, 10 m of *true* path, or 1, 5, 10 s; ``n`` pairs with an
-    answer at both ends (Sturm et al. 2012; Geiger et al. 2012; Zhang & Scaramuzza 2018).
+    From every instant to the first one after at least 1, 5, 10 m of *true* path, or 1, 5, 10 s; ``n`` pairs with a
+    whole pose at both ends (Sturm et al. 2012; Geiger et al. 2012; Zhang & Scaramuzza 2018).
     """
     poses, path_m, clock_ns = Poses.of(measured), _path_m(measured), _clock_ns(measured)
+    period_ns = _period_ns(clock_ns)
     pairs = {f"rpe_d_{reach}m": ahead(path_m, reach - ROUNDING_M) for reach in DISTANCES_M}
-    pairs |= {f"rpe_t_{reach}s": later(clock_ns, nanoseconds(reach)) for reach in DURATIONS_S}
+    pairs |= {f"rpe_t_{reach}s": later(clock_ns, nanoseconds(reach), period_ns) for reach in DURATIONS_S}
+    whole = not np.isnan(poses.turn).any()
     scores: dict[str, float] = {}
     for name, (start, end) in pairs.items():
-        scores |= _summary(name, *relative_errors(poses, start, end))
+        found = relative_errors(poses, start, end)
+        scores |= _summary(name, found if whole else found[:, ~np.isnan(found).any(axis=0)])
     return scores
 
 
-def _summary(name: str, translation: Floats, rotation: Floats) -> dict[str, float]:
-    unanswered = np.isnan(translation)
-    if unanswered.any():
-        translation, rotation = translation[~unanswered], rotation[~unanswered]
+def _summary(name: str, found: Floats) -> dict[str, float]:
+    rmse, rotation_rmse = root_mean_squares(found)
+    median, rotation_median = quantiles(found, 0.5)
     return {
-        f"{name}_n": float(len(translation)),
-        f"{name}_rmse": root_mean_square(translation),
-        f"{name}_median": quantile(translation, 0.5),
-        f"{name}_rot_rmse": root_mean_square(rotation),
-        f"{name}_rot_median": quantile(rotation, 0.5),
+        f"{name}_n": float(found.shape[1]),
+        f"{name}_rmse": rmse,
+        f"{name}_median": median,
+        f"{name}_rot_rmse": rotation_rmse,
+        f"{name}_rot_median": rotation_median,
     }
 
 
@@ -77,13 +79,18 @@ def ahead(along: Floats | Whole, reach: float) -> Pairs:
     return (slice(count), end) if near.all() else (np.flatnonzero(near), end[near])
 
 
-def later(clock_ns: Whole, reach_ns: int) -> Pairs:
-    """`ahead` of times: at an even rate, as most instants come, the pairs are plain slices and cost nothing."""
-    steps = np.diff(clock_ns)
-    if len(steps) == 0 or steps.min() != steps.max() or steps[0] > (LONGEST - 1.0) * reach_ns:
+def later(clock_ns: Whole, reach_ns: int, period_ns: int) -> Pairs:
+    """`ahead` of times: where they come every ``period_ns``, the pairs are plain slices and cost nothing."""
+    if not 0 < period_ns <= (LONGEST - 1.0) * reach_ns:
         return ahead(clock_ns, reach_ns)
-    count = -(-reach_ns // int(steps[0]))
+    count = -(-reach_ns // period_ns)
     return slice(max(len(clock_ns) - count, 0)), slice(count, None)
+
+
+def _period_ns(clock_ns: Whole) -> int:
+    """From each instant to the next, as most come; 0 where they are not even."""
+    steps = clock_ns[1:] - clock_ns[:-1]
+    return int(steps[0]) if len(steps) and steps.min() == steps.max() else 0
 
 
 class Poses(NamedTuple):
@@ -106,9 +113,9 @@ class Poses(NamedTuple):
         return cls(true, said, measured.turn, back, said * back - true)
 
 
-def relative_errors(poses: Poses, start: slice | Whole, end: slice | Whole) -> tuple[Floats, Floats]:
-    """Size of translation [m] and rotation [rad] of E = (T_i⁻¹ T_j)⁻¹ (T̂_i⁻¹ T̂_j) in SE(2) for k pairs (i, j), (k,);
-    NaN where an end has no answer.
+def relative_errors(poses: Poses, start: slice | Whole, end: slice | Whole) -> Floats:
+    """Size of translation [m] and rotation [rad] of E = (T_i⁻¹ T_j)⁻¹ (T̂_i⁻¹ T̂_j) in SE(2) for k pairs (i, j), (2, k);
+    NaN where an end has no answer, or one without a heading.
 
     Turning E by the true heading at i leaves its size: what remains is the answer's step, turned back by the heading
     error at i, minus the true step.
@@ -116,14 +123,14 @@ def relative_errors(poses: Poses, start: slice | Whole, end: slice | Whole) -> t
     moved = poses.said[end] * poses.back[start]
     moved -= poses.true[end]
     moved -= poses.beside[start]
-    turned = poses.turn[end] - poses.turn[start]
-    return np.abs(moved), np.abs(turned - 2.0 * np.pi * np.rint(turned * (0.5 / np.pi)))
+    turned = np.abs(poses.turn[end] - poses.turn[start])
+    return np.array([np.abs(moved), np.minimum(turned, 2.0 * np.pi - turned)])
 
 
 def velocity_metrics(measured: Errors) -> dict[str, float]:
     """Size of the difference between the mean velocities over 1 s of answers and truth [m/s]: mean and p95."""
     clock_ns = _clock_ns(measured)
-    start, end = later(clock_ns, nanoseconds(SPEED_WINDOW_S))
+    start, end = later(clock_ns, nanoseconds(SPEED_WINDOW_S), _period_ns(clock_ns))
     error = measured.dx + 1j * measured.dy
     gained = np.abs(error[end] - error[start])
     speed = gained / ((clock_ns[end] - clock_ns[start]) / NANOSECONDS)
@@ -138,11 +145,13 @@ def step_metrics(measured: Errors, top_speed_m_s: float = TOP_SPEED_M_S) -> dict
     """
     if len(measured.time_ns) == 0:
         return {"jump_rate": math.nan, "path_ratio": math.nan}
-    moved = np.diff(measured.x + 1j * measured.y)
-    step = np.abs(moved + np.diff(measured.dx + 1j * measured.dy))
-    seconds = np.diff(measured.time_ns) / NANOSECONDS
-    stamped = seconds - np.diff(np.where(np.isfinite(measured.age_s), measured.age_s, 0.0))
-    both = np.isfinite(step) & (np.diff(measured.run) == 0)
+    true, error = measured.x + 1j * measured.y, measured.dx + 1j * measured.dy
+    moved = true[1:] - true[:-1]
+    step = np.abs(moved + (error[1:] - error[:-1]))
+    seconds = (measured.time_ns[1:] - measured.time_ns[:-1]) / NANOSECONDS
+    age_s = np.where(np.isfinite(measured.age_s), measured.age_s, 0.0)
+    stamped = seconds - (age_s[1:] - age_s[:-1])
+    both = np.isfinite(step) & (measured.run[1:] == measured.run[:-1])
     jumps = step[both] > top_speed_m_s * stamped[both] + JUMP_M
     minutes, length = float(seconds[both].sum()) / 60.0, float(np.abs(moved)[both].sum())
     return {
@@ -153,13 +162,18 @@ def step_metrics(measured: Errors, top_speed_m_s: float = TOP_SPEED_M_S) -> dict
 
 def _path_m(measured: Errors) -> Floats:
     """True path length up to each instant (n,) [m]."""
-    steps = np.abs(np.diff(measured.x + 1j * measured.y))
-    steps[np.diff(measured.run) != 0] = APART
-    return np.concatenate([np.zeros(min(len(measured.x), 1)), np.cumsum(steps)])
+    place = measured.x + 1j * measured.y
+    steps = np.abs(place[1:] - place[:-1])
+    steps[measured.run[1:] != measured.run[:-1]] = APART
+    path_m = np.zeros(len(place))
+    np.cumsum(steps, out=path_m[1:])
+    return path_m
 
 
 def _clock_ns(measured: Errors) -> Whole:
     """Time since the first instant (n,), the runs one after the other."""
-    steps = np.diff(measured.time_ns)
-    steps[np.diff(measured.run) != 0] = nanoseconds(APART)
-    return np.concatenate([np.zeros(min(len(measured.x), 1), dtype=np.int64), np.cumsum(steps)])
+    steps = measured.time_ns[1:] - measured.time_ns[:-1]
+    steps[measured.run[1:] != measured.run[:-1]] = nanoseconds(APART)
+    clock_ns = np.zeros_like(measured.time_ns)
+    np.cumsum(steps, out=clock_ns[1:])
+    return clock_ns

@@ -9,10 +9,9 @@ import numpy as np
 
 from benchmarks.metrics.score import quantile
 from benchmarks.plotting import label, panels, plain_colour, plain_ticks
-from benchmarks.report.material import Material
+from benchmarks.report.material import Material, radio_of
 from benchmarks.runner.results import by_contestant, score_matrix
 from benchmarks.sites.placement import Grid, Readings, default_step, error_map
-from fusion import Ranges
 from logs.run import Run
 
 if TYPE_CHECKING:
@@ -127,11 +126,7 @@ def maps(material: Material) -> Figure:
 
 def _bound(axes: Axes, run: Run) -> None:
     """What the best unbiased fix from one reading of each anchor errs, as contours [m]."""
-    ranged = any(isinstance(measurement, Ranges) for measurement in run.measurements)
-    readings, grid = (
-        Readings("range" if ranged else "rssi"),
-        Grid.over(run.world.bounds, default_step(run.world.bounds)),
-    )
+    readings, grid = Readings(radio_of(run)), Grid.over(run.world.bounds, default_step(run.world.bounds))
     if len(run.world.anchors) < 2:
         return
     error_m = error_map(run.world.anchors, readings, grid.places(run.world.robot.antenna_m[2]))

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.metrics.bound import Places, Radio, fix_error
+from benchmarks.metrics.deviation import Errors, errors
 from benchmarks.metrics.instants import Answers, Instants, evaluation_instants, match
 from benchmarks.metrics.track import Floats, from_bytes
 from benchmarks.runner.definition import CLEAN, Suite
@@ -16,7 +18,7 @@ from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store
 from benchmarks.runner.time_verb import read_timing
 from benchmarks.statistics.verdict import Comparison
-from fusion import ParameterError
+from fusion import ParameterError, Ranges
 from fusion.values import seconds
 from logs.run import Run
 
@@ -41,6 +43,11 @@ class Series(NamedTuple):
         """Horizontal distances."""
         away = np.hypot(self.answers.x - self.instants.x, self.answers.y - self.instants.y)
         return np.where(self.answers.valid, away, np.inf)
+
+
+def radio_of(run: Run) -> Radio:
+    """What a fix of this run is made of: ranges, where it has any."""
+    return "range" if any(isinstance(measurement, Ranges) for measurement in run.measurements) else "rssi"
 
 
 class Material:
@@ -86,6 +93,18 @@ class Material:
             if cell.fault.id == CLEAN and cell.seed == 0 and cell.run.id in self.scored_runs:
                 found[cell.run.id, cell.contestant.id] = self._series(result)
         return found
+
+    def seeds(self, contestant: str, fault: str) -> list[list[Errors]]:
+        """Of each shown run the errors of its seeds under one fault; a crashed one answered nothing."""
+        own = by_contestant(self.results, fault).get(contestant, [])
+        of_runs = [[result for result in own if result.cell.run.id == run_id] for run_id in self.scored_runs]
+        series = [[self._series(result) for result in results] for results in of_runs]
+        return [[errors(one.instants, one.answers) for one in seeds] for seeds in series]
+
+    def fix_bound_m(self, series: Series) -> Floats:
+        """The least error of a fix from one reading of every anchor, at each instant of a cell [m]."""
+        run, true = self.run(series.result.cell.run.id), series.instants
+        return fix_error(run.world.anchors, Places.of_poses(run.world, true.x, true.y, true.heading), radio_of(run))
 
     def run(self, run_id: str) -> Run:
         """The run itself, for its map."""

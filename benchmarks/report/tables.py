@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.metrics.bound import eff_crlb
+from benchmarks.metrics.credibility import credibility_metrics
 from benchmarks.metrics.posterior import eff_pcrlb, posterior_bound
 from benchmarks.metrics.score import quantile
 from benchmarks.metrics.track import Floats
@@ -85,6 +87,35 @@ def limits(material: Material) -> Sheet:
         rows.append((name, *cells))
     title = "Times the physical limit: RMSE over the posterior Cramér-Rao bound of the run (0.89 is perfect in one run)"
     return Sheet(title, ("estimator", *bounds), tuple(rows))
+
+
+def fixes(material: Material) -> Sheet:
+    """What one perfect fix from a reading of every anchor would err, over what each contestant errs (`eff_crlb`)."""
+    rows = []
+    for name in material.contestants:
+        series = [material.series.get((run_id, name)) for run_id in material.scored_runs]
+        found = [math.nan if one is None else eff_crlb(one.error_m, material.fix_bound_m(one)) for one in series]
+        rows.append((name, *("–" if math.isnan(ratio) else f"{100.0 * ratio:.0f} %" for ratio in found)))
+    title = "One perfect fix: its Cramér-Rao bound over the RMSE (only motion or a prior brings more than 100 %)"
+    return Sheet(title, ("estimator", *material.scored_runs), tuple(rows))
+
+
+def credibility(material: Material) -> Sheet:
+    """Claimed against actual errors over the seeds, under each set of faults.
+
+    Without faults the seeds share every reading, and an error that all of them share would count as the actual one.
+    """
+    faults = [fault.id for fault in material.suite.faults if fault.id != CLEAN]
+    rows = []
+    for name in material.contestants:
+        found = [credibility_metrics(material.seeds(name, fault)) for fault in faults]
+        rows.append((name, *(_decibels(scores) for scores in found)))
+    title = "Credibility over the seeds: nci, and incl in brackets, dB (0 is credible, incl above 0 too certain)"
+    return Sheet(title, ("estimator", *faults), tuple(rows))
+
+
+def _decibels(scores: dict[str, float]) -> str:
+    return "–" if math.isnan(scores["nci"]) else f"{scores['nci']:.1f} ({scores['incl']:+.1f})"
 
 
 def moments(found: Sequence[Moment], folder: Path) -> Sheet:

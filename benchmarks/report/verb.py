@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import fusion
+from benchmarks.metrics.credibility import LEAST_SEEDS
 from benchmarks.output import write
 from benchmarks.page import as_html, inline_png
 from benchmarks.plotting import as_png, require_matplotlib
@@ -85,8 +86,11 @@ def _sheets(material: Material, *, limit: bool) -> Iterator[Sheet]:
         yield sheet(material.comparison)
     if limit and material.scored_runs:
         yield tables.limits(material)
+        yield tables.fixes(material)
     if len(material.suite.faults) > 1:
         yield tables.faults(material)
+        if material.suite.seeds >= LEAST_SEEDS and material.scored_runs:
+            yield tables.credibility(material)
     if found := worst_moments(material):
         yield tables.moments(found, material.suite.folder)
     if (lost := tables.lost(material.results)).rows:
@@ -107,7 +111,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     suite_options(parser)
     parser.add_argument("--html", type=Path, metavar="F", help="one file, no network (needs the extra `plots`)")
     parser.add_argument("--markdown", type=Path, metavar="F", help="the same as Markdown, figures in it")
-    parser.add_argument("--limit", action="store_true", help="compare with the physical limit of each run; slower")
+    parser.add_argument("--limit", action="store_true", help="compare with the physical limits of each run; slower")
     parser.add_argument("--metric", default=RANKED_BY, help="what is compared; lower is better (%(default)s)")
 
 

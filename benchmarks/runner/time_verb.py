@@ -1,4 +1,4 @@
-"""``fusion bench time``: what each estimator costs, measured alone on the machine, best of several, never cached."""
+"""``fusion bench time``: what each estimator costs in time and memory, alone on the machine, never cached."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from benchmarks.arguments import at_least_one
 from benchmarks.metrics.track import Floats
 from benchmarks.output import write_json
 from benchmarks.prior import starting_prior
-from benchmarks.runner.definition import Contestant, Suite, load_suite
+from benchmarks.runner.definition import Contestant, RunSource, Suite, load_suite
 from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.source import open_run
 from benchmarks.sheet import Sheet, print_sheets
+from benchmarks.workers import Limits, Loss, compute, peak_rss_bytes
 from fusion.values import seconds
 from logs.run import Run
 
@@ -30,8 +31,9 @@ TIMING_FILE = "timing.json"
 
 class Timing(NamedTuple):
     """What one contestant costs: processor time per measurement [µs], the least of all repeats and their quartiles;
-    quantiles of the time one measurement takes [µs], in the best repeat; and how many seconds of processor time a
-    second of the log takes.
+    quantiles of the time one measurement takes [µs], in the best repeat; how many seconds of processor time a second
+    of the log takes; and the peak memory [MB] of a fresh process that opens the run and filters it once, None if it
+    does not survive.
     """
 
     contestant: str
@@ -43,6 +45,7 @@ class Timing(NamedTuple):
     upd_p99_us: float
     upd_max_us: float
     rtf: float
+    rss_mb: float | None
 
 
 def measure(suite: Suite, repeats: int = REPEATS) -> Iterator[Timing]:
@@ -59,7 +62,8 @@ def measure(suite: Suite, repeats: int = REPEATS) -> Iterator[Timing]:
         best = folds[int(np.argmin(means))]
         low, high = np.quantile(means, (0.25, 0.75)).tolist()
         p50, p95, p99, most = np.quantile(best, (0.50, 0.95, 0.99, 1.0)).tolist()
-        yield Timing(contestant.id, min(means), low, high, p50, p95, p99, most, 1e-6 * float(best.sum()) / log_s)
+        rtf, rss_mb = 1e-6 * float(best.sum()) / log_s, peak_mb(suite.runs[0], suite.folder, contestant)
+        yield Timing(contestant.id, min(means), low, high, p50, p95, p99, most, rtf, rss_mb)
 
 
 def _fold_us(run: Run, contestant: Contestant) -> Floats:
@@ -71,6 +75,22 @@ def _fold_us(run: Run, contestant: Contestant) -> Floats:
         tracker.push(measurement)
         clock.append(time.process_time_ns())
     return np.diff(np.array(clock)) / 1e3
+
+
+def peak_mb(source: RunSource, folder: Path, contestant: Contestant) -> float | None:
+    """Peak memory [MB] of a process of its own, from its start to the end of the run."""
+    ((_, found),) = compute(_fold_alone, _no_peak, [(source, folder, contestant)], 1, Limits())
+    return found
+
+
+def _fold_alone(task: tuple[RunSource, Path, Contestant]) -> float | None:
+    source, folder, contestant = task
+    _fold_us(open_run(source, folder), contestant)
+    return peak_rss_bytes() / 2**20
+
+
+def _no_peak(_task: tuple[RunSource, Path, Contestant], _loss: Loss) -> None:
+    return None
 
 
 def machine() -> dict[str, str]:
@@ -104,9 +124,15 @@ def run(arguments: argparse.Namespace) -> int:
     write_json(
         arguments.store / TIMING_FILE, {"machine": machine(), "timings": [timing._asdict() for timing in timings]}
     )
-    rows = tuple(
-        (timing.contestant, *(f"{value:.1f}" for value in timing[1:-1]), f"{timing.rtf:.4f}") for timing in timings
+    rows = tuple(_row(timing) for timing in timings)
+    head = ("µs per measurement", "least", "q25", "q75", "p50", "p95", "p99", "max", "CPU s per log s", "peak MB")
+    print_sheets(
+        [Sheet("Alone on this machine: processor time, means over repeats and single measurements; memory", head, rows)]
     )
-    head = ("µs per measurement", "least", "q25", "q75", "p50", "p95", "p99", "max", "CPU s per log s")
-    print_sheets([Sheet("Processor time, alone on this machine: means over repeats, single measurements", head, rows)])
     return 0
+
+
+def _row(timing: Timing) -> tuple[str, ...]:
+    name, *times_us, rtf, rss_mb = timing
+    memory = "–" if rss_mb is None else f"{rss_mb:.0f}"
+    return (str(name), *(f"{value:.1f}" for value in times_us), f"{rtf:.4f}", memory)

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.metrics.bound import rssi_fix_bound
 from benchmarks.report.figures import FIGURES
 from benchmarks.report.material import Material
+from benchmarks.report.tables import credibility, fixes
 from benchmarks.report.verb import report
 from benchmarks.report.worst import as_log, worst_moments
 from benchmarks.review.review import review
@@ -72,7 +74,9 @@ def test_page_holds_verdicts_tables_figures_and_provenance(material):
 def test_cost_is_drawn_once_it_was_measured(place, capsys):
     words = [str(place / "suite.toml"), "--store", str(place / "store")]
     assert main(["bench", "time", *words, "--repeats", "1"]) == 0
-    assert "wheels" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "wheels" in printed
+    assert "peak MB" in printed
     suite, store = load_suite(place / "suite.toml"), Store(place / "store")
     timed = Material(suite, read_results(cells_of(suite, store), store), store)
     assert timed.timing.keys() == {"wheels", "radio"}
@@ -84,6 +88,34 @@ def test_distance_from_the_limit_is_told_where_it_is_asked_for(material):
     page = report(material, "", limit=True)
     (row,) = re.findall(r"\| wheels \| ([\d.]+)× \| ([\d.]+)× \|", page)
     assert all(float(ratio) > 0.0 for ratio in row)
+    assert "One perfect fix" in page
+
+
+def test_efficiency_of_fixes_is_that_of_the_bound_at_the_true_places(material):
+    cell = material.series["office", "radio"]
+    world, bound_m = material.run("office").world, material.fix_bound_m(cell)
+    x, y, heading = (float(column[7]) for column in cell.instants[1:])
+    assert bound_m[7] == pytest.approx(np.sqrt(np.trace(rssi_fix_bound(world, x, y, heading))), rel=1e-12)
+    valid = cell.answers.valid
+    ratio = np.sqrt(np.mean(bound_m[valid] ** 2) / np.mean(cell.error_m[valid] ** 2))
+    (row,) = [row for row in fixes(material).rows if row[0] == "radio"]
+    assert row[1] == f"{100.0 * ratio:.0f} %"
+
+
+def test_credibility_is_told_where_seeds_can_tell_it(material, tmp_path):
+    """Every second reading drawn anew for each seed makes radio fixes err anew; wheels do not hear of it."""
+    assert "Credibility" not in report(material, "")
+    assert credibility(material).rows == (("wheels", "–"), ("radio", "–"))
+    text = SUITE.replace('name = "page"', 'name = "page"\nseeds = 6').replace('"wifi" }', '"wifi", p = 0.5 }')
+    (tmp_path / "seeds.toml").write_text(text.replace('use = "radio_only"', 'use = "ekf"'), encoding="utf-8")
+    suite, store = load_suite(tmp_path / "seeds.toml"), Store(tmp_path / "store")
+    run_suite(suite, store, workers=1)
+    seeded = Material(suite, read_results(cells_of(suite, store), store), store)
+    assert "Credibility" in report(seeded, "")
+    rows = {row[0]: row[1:] for row in credibility(seeded).rows}
+    assert rows["wheels"] == ("–",)
+    nci, incl = map(float, re.fullmatch(r"([\d.]+) \(([+-][\d.]+)\)", rows["radio"][0]).groups())
+    assert 0.0 < abs(incl) <= nci
 
 
 def test_what_one_run_says_of_itself_is_told_only_where_it_is_the_only_one(material, tmp_path):

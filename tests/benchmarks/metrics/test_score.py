@@ -110,6 +110,16 @@ ORACLE_A = {
 }
 
 
+def test_distribution_function_at_the_named_radii_is_rayleighs(instants_of, answers_of):
+    """Errors at the middles of 20 000 equal shares of 1 - exp(-r² / 2 σ²): what is counted is off by half a share."""
+    share = (np.arange(20_000) + 0.5) / 20_000
+    error = 0.8 * np.sqrt(-2.0 * np.log1p(-share))
+    instants = instants_of(0.1 * np.arange(20_000), *np.zeros((3, 20_000)))
+    scores = metrics(errors(instants, answers_of(error, *np.zeros((2, 20_000)))))
+    for name, radius_m in (("10cm", 0.1), ("30cm", 0.3), ("50cm", 0.5), ("1m", 1.0), ("2m", 2.0), ("3m", 3.0)):
+        assert scores[f"pos_cdf_{name}"] == pytest.approx(1.0 - math.exp(-(radius_m**2) / 1.28), abs=3e-5)
+
+
 @pytest.mark.parametrize("name", ORACLE_A)
 def test_metric_of_the_reference_run_is_as_worked_out(name):
     assert scores_of(oracle_updates())[name] == pytest.approx(ORACLE_A[name], rel=1e-9)
@@ -117,7 +127,7 @@ def test_metric_of_the_reference_run_is_as_worked_out(name):
 
 def test_every_metric_has_one_documented_name():
     told = set(re.findall(r"`(\w+)`", (ROOT / "docs" / "benchmark.md").read_text(encoding="utf-8")))
-    families = re.compile(r"(rpe_[dt]_\d+m?s?|pos_p\d\d(?=_)|abs_[xy]|along|cross|(?<=rpe)rot)")
+    families = re.compile(r"(rpe_[dt]_\d+m?s?|pos_p\d\d(?=_)|pos_cdf_\d+c?m|abs_[xy]|along|cross|(?<=rpe)rot)")
     for name in scores_of(oracle_updates()):
         assert name in told or families.match(name), name
 
@@ -128,6 +138,7 @@ def test_estimator_that_died_after_five_seconds_cannot_look_healthy():
     assert scores["availability"] == pytest.approx(0.06, rel=1e-9)
     assert scores["pos_p50"] == scores["pos_p75"] == math.inf
     assert scores["pos_auc"] == pytest.approx(0.0536074051223, rel=1e-9)
+    assert (scores["pos_cdf_10cm"], scores["pos_cdf_3m"]) == (0.0, 0.06)
     assert scores["pos_rmse"] == pytest.approx(0.322438565188, rel=1e-9)
 
 

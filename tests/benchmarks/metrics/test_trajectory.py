@@ -92,6 +92,14 @@ def test_relative_errors_need_headings_and_velocities_do_not(straight):
     assert velocity_metrics(measured)["vel_err"] == 0.0
 
 
+def test_a_pair_needs_a_heading_at_both_ends(straight):
+    heading = np.zeros(600)
+    heading[100] = np.nan
+    scores = relative_pose_metrics(errors(*straight(heading=heading)))
+    assert scores["rpe_t_1s_n"] == 590.0 - 2.0
+    assert scores["rpe_t_1s_rot_rmse"] == scores["rpe_t_1s_rot_median"] == 0.0
+
+
 def test_velocity_error_of_a_drift_is_the_drift(straight):
     instants, answers = straight()
     drifting = answers._replace(x=answers.x + 0.03 * np.arange(600) / 10.0, y=answers.y - 0.04 * np.arange(600) / 10.0)

@@ -3,18 +3,20 @@
 import csv
 import json
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from benchmarks.runner.compare_verb import stored_results
-from benchmarks.runner.definition import Gate, load_suite
+from benchmarks.runner.definition import Contestant, Gate, RunSource, load_suite
 from benchmarks.runner.gate_verb import Outcome, judge, read_baseline
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import comparison, flat, score_matrix
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
+from benchmarks.runner.time_verb import peak_mb
 from benchmarks.runner.verify_verb import differing
 from fusion.cli import main
 
@@ -200,3 +202,14 @@ def test_verbs_refuse_a_suite_that_is_not_done(place, tmp_path, capsys):
     for verb in ("compare", "export"):
         assert main(["bench", verb, str(place / "suite.toml"), "--store", str(tmp_path / "none")]) == 1
         assert "0 of 16 cells are there; run `fusion bench run` first" in capsys.readouterr().err
+
+
+def test_peak_memory_is_that_of_the_estimator_in_a_process_of_its_own():
+    """300 000 particles are three columns of 2.4 MB at the least; what this process holds is not counted."""
+    held = np.ones(50_000_000)
+    few, many = (
+        peak_mb(RunSource("office", scenario="office", duration_s=1.0), Path(), Contestant("pf", "particle", params))
+        for params in ({"particles": 10}, {"particles": 300_000})
+    )
+    assert 10.0 < few < held.nbytes / 2**20
+    assert many > few + 3 * 2.4e6 / 2**20

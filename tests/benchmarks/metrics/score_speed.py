@@ -1,0 +1,115 @@
+"""What it costs to score: one pair of 1 000 poses in a warm process, by kinds of metrics, and stored cells scored anew.
+
+Run it from the top folder, with one thread: ``OMP_NUM_THREADS=1 python tests/benchmarks/metrics/score_speed.py``. Times
+are processor time, the least of many rounds over pairs that differ; the last column is a multiple of the anchor, one
+transform of eight series as long as the pair and back, timed in the same rounds.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.metrics.consistency import consistency_metrics, distribution_metrics
+from benchmarks.metrics.deviation import errors
+from benchmarks.metrics.drift import drift_metrics
+from benchmarks.metrics.dynamics import dynamic_metrics
+from benchmarks.metrics.instants import Instants, evaluation_instants, match
+from benchmarks.metrics.position import axis_metrics, heading_metrics, position_metrics, track_metrics
+from benchmarks.metrics.score import for_json, metrics
+from benchmarks.metrics.track import FateColumns, Track, from_bytes, to_bytes
+from benchmarks.metrics.trajectory import trajectory_metrics
+from benchmarks.runner.store import to_json
+from logs.run import TruthTrack
+
+RATE_HZ = 10.0
+KINDS = (
+    position_metrics,
+    axis_metrics,
+    track_metrics,
+    heading_metrics,
+    trajectory_metrics,
+    drift_metrics,
+    consistency_metrics,
+    distribution_metrics,
+    dynamic_metrics,
+)
+ANCHOR, PAIR, RESCORED = "transform of eight series", "one pair", "one stored cell scored anew"
+
+
+class Pair(NamedTuple):
+    """A figure of eight, and a track beside it whose errors last for two seconds."""
+
+    truth: TruthTrack
+    track: Track
+
+    @classmethod
+    def drawn(cls, poses: int, seed: int):
+        """At 10 Hz, with a covariance that is about honest and a radio fix every two seconds."""
+        t = np.arange(poses) / RATE_HZ
+        x, y = 5.0 * np.sin(0.1 * t), 2.5 * np.sin(0.2 * t)
+        heading = np.arctan2(np.cos(0.2 * t), np.cos(0.1 * t))
+        error = np.random.default_rng(seed).normal(size=(poses, 3))
+        for k in range(1, poses):
+            error[k] = 0.95 * error[k - 1] + 0.31 * error[k]
+        error *= 0.2, 0.15, 0.02
+        time_ns = np.rint(1e9 * t).astype(np.int64)
+        said = Track.of_poses(time_ns, x + error[:, 0], y + error[:, 1], heading + error[:, 2])
+        claimed = np.tile([0.04, 0.0, 0.0, 0.0225, 0.0, 0.0004], (poses, 1))
+        fixes_ns = time_ns // 2_000_000_000 * 2_000_000_000
+        return cls(TruthTrack(time_ns, x, y, heading), said._replace(covariance=claimed, fix_ns=fixes_ns))
+
+    @property
+    def instants(self) -> Instants:
+        """Where it is judged."""
+        return evaluation_instants(self.truth)
+
+
+class Cost(NamedTuple):
+    """Processor time of one pair [µs], and as a multiple of the anchor's."""
+
+    what: str
+    least_us: float
+    ratio: float
+
+
+def measure(poses: int = 1000, rounds: int = 200, pairs: int = 4) -> list[Cost]:
+    """The anchor, a pair with all its metrics, each kind of them by itself, and a stored cell."""
+    drawn = [Pair.drawn(poses, seed) for seed in range(pairs)]
+    met = [(pair.instants, match(pair.instants, pair.track)) for pair in drawn]
+    measured = [errors(*one) for one in met]
+    stored = [(pair.instants, to_bytes(pair.track, FateColumns.of([]))) for pair in drawn]
+    series = [np.random.default_rng(seed).normal(size=(8, poses)) for seed in range(pairs)]
+    jobs: list[tuple[str, Callable, list]] = [
+        (ANCHOR, lambda rows: np.fft.irfft(np.fft.rfft(rows)), series),
+        (PAIR, lambda one: metrics(errors(*one)), met),
+        ("errors", lambda one: errors(*one), met),
+        *((kind.__name__, kind, measured) for kind in KINDS),
+        (RESCORED, rescore, stored),
+    ]
+    least = {name: np.inf for name, _, _ in jobs}
+    for _ in range(rounds):
+        for name, work, inputs in jobs:
+            least[name] = min(least[name], _each_us(work, inputs))
+    return [Cost(name, us, us / least[ANCHOR]) for name, us in least.items()]
+
+
+def rescore(stored: tuple[Instants, bytes]) -> bytes:
+    """What `benchmarks.runner.execute.score` does with one stored estimate, but for the disk."""
+    instants, content = stored
+    track, _ = from_bytes(content)
+    return to_json(for_json(metrics(errors(instants, match(instants, track)))))
+
+
+def _each_us(work: Callable, inputs: list) -> float:
+    started_ns = time.process_time_ns()
+    for one in inputs:
+        work(one)
+    return (time.process_time_ns() - started_ns) / len(inputs) / 1e3
+
+
+if __name__ == "__main__":
+    for cost in measure(*map(int, sys.argv[1:])):
+        sys.stdout.write(f"{cost.what:30s} {cost.least_us:8.0f} µs {cost.ratio:7.2f}\n")

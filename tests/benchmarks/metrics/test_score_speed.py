@@ -1,0 +1,50 @@
+"""What scoring may cost, without a clock: how often the dearest parts run, and that the measurement of speed works."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.metrics import samples
+from benchmarks.metrics.deviation import errors, pool
+from benchmarks.metrics.score import metrics
+
+
+@pytest.fixture
+def transforms(monkeypatch):
+    """The shapes of all series that are transformed."""
+    shapes, forward = [], np.fft.rfft
+
+    def counted(series, length):
+        shapes.append(series.shape)
+        return forward(series, length)
+
+    monkeypatch.setattr(samples.np.fft, "rfft", counted)
+    return shapes
+
+
+def test_all_series_of_a_kind_are_transformed_at_once(oracle_a, transforms):
+    metrics(errors(*oracle_a))
+    assert transforms == [(6, 1000), (2, 1000)]
+
+
+def test_long_series_are_transformed_a_few_at_a_time_to_spare_memory(instants_of, answers_of, transforms):
+    noise = np.random.default_rng(1).normal(size=(3, 40_000))
+    instants = instants_of(0.1 * np.arange(40_000), *np.zeros((3, 40_000)))
+    metrics(errors(instants, answers_of(*noise, np.eye(3))))
+    assert transforms == [(1, 40_000)] * 8
+
+
+def test_runs_that_are_pooled_are_transformed_one_by_one(oracle_a, transforms):
+    measured = errors(*oracle_a)
+    metrics(pool([measured, measured]))
+    assert transforms == [(6, 1000)] * 2 + [(2, 1000)] * 2
+
+
+def test_cost_of_a_pair_is_told_by_kinds_of_metrics():
+    told = runpy.run_path(str(Path(__file__).with_name("score_speed.py")))
+    costs = {cost.what: cost for cost in told["measure"](poses=50, rounds=2, pairs=1)}
+    assert set(costs) > {told["ANCHOR"], told["PAIR"], told["RESCORED"], "errors", "trajectory_metrics"}
+    assert costs[told["ANCHOR"]].ratio == 1.0
+    assert all(cost.least_us > 0.0 for cost in costs.values())
