@@ -11,11 +11,13 @@ import numpy as np
 from benchmarks.metrics.instants import Answers, Instants, evaluation_instants, match
 from benchmarks.metrics.track import Floats, from_bytes
 from benchmarks.runner.definition import CLEAN, Suite
-from benchmarks.runner.results import RANKED_BY, Result, by_contestant, comparison, median_metrics
+from benchmarks.runner.plan_verb import STORE
+from benchmarks.runner.results import RANKED_BY, Result, by_contestant, comparison, judged, median_metrics
 from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store
 from benchmarks.runner.time_verb import read_timing
 from benchmarks.statistics.verdict import Comparison
+from benchmarks.table import Unit, unit_of
 from fusion import ParameterError
 from fusion.values import seconds
 from logs.run import Run
@@ -49,6 +51,34 @@ class Material:
     def __init__(self, suite: Suite, results: Sequence[Result], store: Store, metric: str = RANKED_BY) -> None:
         self.suite, self.results, self.metric = suite, list(results), metric
         self._store = store
+        self._runs: dict[str, Run] = {}
+
+    @property
+    def words(self) -> list[str]:
+        """What names suite and store on a command line."""
+        store = self._store.folder
+        return [self.suite.word, *([] if store == STORE else ["--store", str(store.resolve())])]
+
+    def anchor(self, result: Result) -> str:
+        """What links to the entry of a cell name."""
+        return self._anchors[_ids(result)]
+
+    def anchor_of_all(self, contestant: str) -> str:
+        """What links to all cells of a contestant name."""
+        return f"all-{self.contestants.index(contestant)}"
+
+    @cached_property
+    def _anchors(self) -> dict[tuple[str, str, str, int], str]:
+        return {_ids(result): f"cell-{number}" for number, result in enumerate(self.results)}
+
+    @property
+    def unit(self) -> Unit:
+        """Of what is compared."""
+        return unit_of(self.metric)
+
+    def text(self, value: float) -> str:
+        """A value of what is compared, with its unit."""
+        return f"{self.unit.number(value)} {self.unit.name}".rstrip()
 
     @cached_property
     def contestants(self) -> list[str]:
@@ -73,8 +103,8 @@ class Material:
 
     @cached_property
     def scored_runs(self) -> list[str]:
-        """The first runs that have truth."""
-        known = {result.cell.run.id for result in self.results if result.metrics}
+        """The first runs that count and have truth."""
+        known = {result.cell.run.id for result in judged(self.results) if result.metrics}
         return [run.id for run in self.suite.runs if run.id in known][:SHOWN_RUNS]
 
     @cached_property
@@ -88,8 +118,10 @@ class Material:
         return found
 
     def run(self, run_id: str) -> Run:
-        """The run itself, for its map."""
-        return open_run(self.suite.run(run_id), self.suite.folder)
+        """The run itself; those that are shown are few, and are kept."""
+        if run_id not in self._runs:
+            self._runs[run_id] = open_run(self.suite.run(run_id), self.suite.folder)
+        return self._runs[run_id]
 
     def _series(self, result: Result) -> Series:
         cell, rules = result.cell, result.cell.evaluation
@@ -98,3 +130,8 @@ class Material:
         instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
         track, _ = from_bytes(self._store.read("estimates", cell.estimate_key, "track.npz"))
         return Series(result, instants, match(instants, track, max_age_s=rules.max_age_s))
+
+
+def _ids(result: Result) -> tuple[str, str, str, int]:
+    cell = result.cell
+    return cell.run.id, cell.contestant.id, cell.fault.id, cell.seed
