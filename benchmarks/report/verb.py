@@ -83,6 +83,12 @@ def _about_splits(suite: Suite) -> Iterator[str]:
         yield f"Only for tuning, and in no number but those of the parameters and of their own cells: {named}."
 
 
+def as_page(material: Material, *, limit: bool = False) -> bytes:
+    """The report as one HTML file; raises `FusionError` without matplotlib or markdown-it."""
+    require_matplotlib()
+    return as_html(material.suite.name, report(material, limit=limit), SCRIPT)
+
+
 def counted(count: int, what: str) -> str:
     """A number of things.
 
@@ -164,12 +170,12 @@ def run(arguments: argparse.Namespace) -> int:
     require_matplotlib()
     suite, results = stored_results(arguments)
     material = Material(suite, results, Store(arguments.store), arguments.metric)
-    page = report(material, limit=arguments.limit)
-    targets = [(arguments.markdown, page.encode())]
+    targets = {}
+    if arguments.markdown:
+        targets[arguments.markdown] = report(material, limit=arguments.limit).encode()
     if arguments.html or not arguments.markdown:
-        targets.append((arguments.html or Path(f"{suite.name}.html"), as_html(suite.name, page, SCRIPT)))
-    for path, content in targets:
-        if path is not None:
-            write(path, content)
-            sys.stdout.write(f"{path}\n")
+        targets[arguments.html or Path(f"{suite.name}.html")] = as_page(material, limit=arguments.limit)
+    for path, content in targets.items():
+        write(path, content)
+        sys.stdout.write(f"{path}\n")
     return 0
