@@ -16,6 +16,8 @@ th { text-align: left; }
 img { max-width: 100%; background: white; }
 td[style*="right"], td:not(:last-child) { white-space: nowrap; }
 code { font-size: 0.9em; overflow-wrap: anywhere; }
+td code { display: block; min-width: 20rem; }
+@media (max-width: 50rem) { .figure { overflow-x: auto; } .figure img { max-width: none; zoom: 0.6; } }
 li { margin: 0.4rem 0; }
 summary { cursor: pointer; padding: 0.25rem 0; }
 :target { outline: 2px solid #0072b2; outline-offset: 0.25rem; }
@@ -41,7 +43,7 @@ def as_html(title: str, markdown: str, script: str = "") -> bytes:
 
 def figure(what: str, picture: bytes) -> str:
     """A PNG as a block of HTML that stands in Markdown: a parser of Markdown would read its whole address as text."""
-    return f'<img alt="{html.escape(what)}" src="{inline_png(picture)}">'
+    return f'<div class="figure"><img alt="{html.escape(what)}" src="{inline_png(picture)}"></div>'
 
 
 def inline_png(picture: bytes) -> str:

@@ -66,8 +66,18 @@ def entries(material: Material) -> str:
     return "\n".join(_fold(material, name, own) for name, own in grouped.items())
 
 
+def counted(count: int, what: str) -> str:
+    """A number of things.
+
+    >>> counted(1, "run"), counted(0, "fault")
+    ('1 run', 'no faults')
+    """
+    return f"{count or 'no'} {what}{'' if count == 1 else 's'}"
+
+
 def _fold(material: Material, name: str, own: Sequence[Result]) -> str:
-    head = f'<details id="{material.anchor_of_all(name)}"><summary>{html.escape(name)}: {len(own)} cells</summary><ul>'
+    title = html.escape(f"{name}: {counted(len(own), 'cell')}")
+    head = f'<details id="{material.anchor_of_all(name)}"><summary>{title}</summary><ul>'
     return "\n".join([head, *(_entry(material, result) for result in own), "</ul></details>"])
 
 

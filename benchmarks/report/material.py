@@ -76,6 +76,11 @@ class Material:
         """Of what is compared."""
         return unit_of(self.metric)
 
+    @property
+    def axis(self) -> str:
+        """What is compared, for an axis."""
+        return ", ".join(filter(None, (self.metric, self.unit.name)))
+
     def text(self, value: float) -> str:
         """A value of what is compared, with its unit."""
         return f"{self.unit.number(value)} {self.unit.name}".rstrip()
@@ -89,7 +94,7 @@ class Material:
     @cached_property
     def comparison(self) -> Comparison | None:
         """All pairs; None where nothing can be compared, such as runs without truth."""
-        if len(self.contestants) < 2:
+        if len(self.contestants) < 2 or not self.scored_runs:
             return None
         try:
             return comparison(self.results, self.metric)
@@ -104,8 +109,13 @@ class Material:
     @cached_property
     def scored_runs(self) -> list[str]:
         """The first runs that count and have truth."""
-        known = {result.cell.run.id for result in judged(self.results) if result.metrics}
+        known = {result.cell.run.id for result in judged(self.results) if "availability" in result.metrics}
         return [run.id for run in self.suite.runs if run.id in known][:SHOWN_RUNS]
+
+    @cached_property
+    def has_errors(self) -> bool:
+        """Whether there is anything to draw: an estimator that answered, in a run with truth."""
+        return any(result.worst_at_s is not None for result in judged(self.results))
 
     @cached_property
     def series(self) -> dict[tuple[str, str], Series]:

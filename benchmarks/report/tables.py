@@ -30,7 +30,8 @@ def leaderboard(material: Material) -> Sheet:
         own = grouped[name]
         medians, alive = median_metrics(own), sum(result.status in ALIVE for result in own)
         scores = np.median(score_matrix(own, material.metric), axis=1)
-        worst = link(material, unit.number(scores.max()), nearest(own, material.metric, scores.max()))
+        worst = unit.number(scores.max()) if material.scored_runs else "–"
+        worst = link(material, worst, nearest(own, material.metric, scores.max()))
         head = (letters.get(name, "–"), link_all(material, f"{alive}/{len(own)}", name))
         over_runs = link_all(material, _interval(scores, unit), name)
         numbers = (
@@ -118,7 +119,7 @@ def moments(material: Material) -> Sheet:
 def lost(material: Material) -> Sheet:
     """Every cell that did not survive, and why."""
     rows = tuple(
-        (link(material, str(result.cell), result), result.status, result.error or _why(result))
+        (link(material, str(result.cell), result), result.status, _why(result))
         for result in material.results
         if result.status not in ALIVE
     )
@@ -126,6 +127,8 @@ def lost(material: Material) -> Sheet:
 
 
 def _why(result: Result) -> str:
+    if result.error:
+        return "`" + result.error.replace("`", "'") + "`"  # what a plug-in says is no Markdown
     available = result.metrics.get("availability", math.nan)
     if available < LEAST_AVAILABILITY:
         return f"only {100.0 * available:.0f} % of the instants had a valid answer"

@@ -16,13 +16,13 @@ from benchmarks.output import write
 from benchmarks.page import as_html, figure
 from benchmarks.plotting import as_png, require_matplotlib
 from benchmarks.report import tables
-from benchmarks.report.cells import SCRIPT, entries
+from benchmarks.report.cells import SCRIPT, counted, entries
 from benchmarks.report.figures import FIGURES
 from benchmarks.report.material import Material
 from benchmarks.report.pairs import deciding, pairs, run_by_run
 from benchmarks.report.sensitivity import advice, curves, sensitivity, sweeps
 from benchmarks.runner.compare_verb import stored_results
-from benchmarks.runner.definition import TUNE, Suite
+from benchmarks.runner.definition import TUNE
 from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.results import RANKED_BY
 from benchmarks.runner.store import Store
@@ -61,10 +61,10 @@ def report(material: Material, *, limit: bool = False) -> str:
         f"# {suite.name}",
         *_verdicts(material),
         about,
-        *_about_splits(suite),
+        *_about_runs(material),
         *map(as_markdown, _sheets(material, limit=limit)),
     ]
-    if material.scored_runs:
+    if material.has_errors:
         for name, draw in FIGURES.items():
             if name == "cost" and not material.timing:
                 continue
@@ -73,10 +73,12 @@ def report(material: Material, *, limit: bool = False) -> str:
     return "\n\n".join([*parts, *_provenance(material), "**Cells**", entries(material)]) + "\n"
 
 
-def _about_splits(suite: Suite) -> Iterator[str]:
-    """What the runs for tuning are good for, where there are some."""
-    tune = [run.id for run in suite.runs if run.split == TUNE]
-    if len(tune) == len(suite.runs):
+def _about_runs(material: Material) -> Iterator[str]:
+    """Which runs do not count, and why."""
+    if blind := sorted({result.cell.run.id for result in material.results if not result.cell.content.truth}):
+        yield f"Without ground truth, and so without an error: {', '.join(blind)}."
+    tune = [run.id for run in material.suite.runs if run.split == TUNE]
+    if len(tune) == len(material.suite.runs):
         yield "**All runs are for tuning**: parameters may have been chosen on what they are scored on here."
     elif tune:
         named = ", ".join(tune)
@@ -87,15 +89,6 @@ def as_page(material: Material, *, limit: bool = False) -> bytes:
     """The report as one HTML file; raises `FusionError` without matplotlib or markdown-it."""
     require_matplotlib()
     return as_html(material.suite.name, report(material, limit=limit), SCRIPT)
-
-
-def counted(count: int, what: str) -> str:
-    """A number of things.
-
-    >>> counted(1, "run"), counted(0, "fault")
-    ('1 run', 'no faults')
-    """
-    return f"{count or 'no'} {what}{'' if count == 1 else 's'}"
 
 
 def _verdicts(material: Material) -> Iterator[str]:
@@ -139,7 +132,7 @@ def _sheets(material: Material, *, limit: bool) -> Iterator[Sheet]:
 
 def _sensitivity(material: Material) -> Iterator[str]:
     """Nothing without a grid, or where nothing was scored."""
-    found = sweeps(material) if material.scored_runs else []
+    found = sweeps(material) if material.has_errors else []
     if found:
         yield as_markdown(sensitivity(material, found))
         yield "\n".join(f"- {sentence}" for sentence in advice(found))

@@ -28,7 +28,7 @@ from fusion.values import seconds
 from logs.run import Run
 
 LOST = {
-    Loss.CRASHED: "its process died, twice; run it alone with --workers 1 to see why",
+    Loss.CRASHED: "its process died, twice; `fusion bench replay` runs it alone, to see why",
     Loss.TIMEOUT: "it took longer than limits.wall_s of the suite",
     Loss.OUT_OF_MEMORY: "it took more memory than limits.rss_mb of the suite",
 }

@@ -50,8 +50,11 @@ def read_results(cells: Iterable[Cell], store: Store) -> list[Result]:
 
 
 def judged(results: Sequence[Result]) -> list[Result]:
-    """The results that count: those of the test runs; where all runs are for tuning, all of them."""
-    return [result for result in results if result.cell.run.split == TEST] or list(results)
+    """The results that count: those of the test runs with ground truth; where there is none such, of the test runs, or
+    of all.
+    """
+    test = [result for result in results if result.cell.run.split == TEST] or list(results)
+    return [result for result in test if result.cell.content.truth] or test
 
 
 def by_contestant(results: Sequence[Result], fault: str = CLEAN) -> dict[str, list[Result]]:

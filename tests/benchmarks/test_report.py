@@ -25,6 +25,9 @@ from benchmarks.runner.results import read_results
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
 from fusion.cli import main
+from logs.reader import read_run
+from logs.writer import RunWriter
+from sensors.simulate import simulate
 
 SUITE = """
 [suite]
@@ -280,3 +283,47 @@ def test_suite_of_nothing_but_tune_runs_says_so(tmp_path):
     _, head, rest = GRID.partition("[[estimators]]")
     runs = GRID[: GRID.index('[[runs]]\nid = "mec"')]
     assert "**All runs are for tuning**" in report(grid_of(tmp_path, runs + head + rest))
+
+
+LOST = """
+[suite]
+name = "lost"
+[[runs]]
+id = "office"
+scenario = "office"
+duration_s = 6.0
+[[estimators]]
+id = "broken"
+use = "ekf"
+params = { gate_probability = 7.0 }
+"""
+
+
+def test_estimator_that_crashed_everywhere_leaves_a_page_that_says_why_and_draws_nothing(tmp_path):
+    page = report(grid_of(tmp_path, LOST))
+    ((cell, status, why),) = rows_of(page, "Lost cells")
+    assert (status, cell) == ("crashed", "[office broken clean 0](#cell-0)")
+    assert why.startswith("`")
+    assert "gate_probability" in why
+    assert "data:image" not in page
+    assert "1 run, 1 estimator, no faults, 1 seed: 1 cell." in page
+
+
+def test_runs_without_truth_rank_nobody_and_are_named(tmp_path):
+    seen = read_run(simulate("office", tmp_path / "seen.mcap", duration_s=10.0))
+    with RunWriter(tmp_path / "blind.mcap", seen.world, name="blind", prior=seen.prior) as log:
+        for measurement in seen.measurements:
+            log.write(measurement)
+    blind = '[[runs]]\nid = "blind"\nmcap = "blind.mcap"\n'
+    estimators = "".join(
+        f'[[estimators]]\nid = "{name}"\nuse = "{name}"\n' for name in ("dead_reckoning", "radio_only")
+    )
+    alone = report(grid_of(tmp_path, f'[suite]\nname = "blind"\n{blind}{estimators}'))
+    assert "Nothing can be compared" in alone
+    assert "∞" not in alone
+    assert "data:image" not in alone
+    beside = f'[suite]\nname = "both"\n{blind}[[runs]]\nid = "seen"\nmcap = "seen.mcap"\n{estimators}'
+    page = report(grid_of(tmp_path, beside))
+    assert "Without ground truth, and so without an error: blind." in page
+    assert [row[0] for row in rows_of(page, "Run by run")] == ["seen"]
+    assert all(row[2].startswith("[1/1]") for row in rows_of(page, "Leaderboard"))
