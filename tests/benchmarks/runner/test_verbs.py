@@ -3,19 +3,22 @@
 import csv
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from benchmarks.runner.compare_verb import stored_results
-from benchmarks.runner.definition import Gate, load_suite
+from benchmarks.runner.definition import Contestant, FaultSet, Gate, RunSource, load_suite
+from benchmarks.runner.export_verb import as_junit, as_latex
 from benchmarks.runner.gate_verb import Outcome, judge, read_baseline
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import comparison, flat, score_matrix
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
 from benchmarks.runner.verify_verb import differing
+from benchmarks.sheet import Sheet
 from fusion.cli import main
 
 HEAD = '[suite]\nname = "verbs"\n'
@@ -200,3 +203,11 @@ def test_verbs_refuse_a_suite_that_is_not_done(place, tmp_path, capsys):
     for verb in ("compare", "export"):
         assert main(["bench", verb, str(place / "suite.toml"), "--store", str(tmp_path / "none")]) == 1
         assert "0 of 16 cells are there; run `fusion bench run` first" in capsys.readouterr().err
+
+
+def test_what_an_estimator_says_breaks_no_export():
+    cell = SimpleNamespace(run=RunSource("a"), fault=FaultSet("clean"), contestant=Contestant("b", "b"), seed=0)
+    lost = SimpleNamespace(cell=cell, status="crashed", error="red \x1b[31m & <b>\x00")
+    failure = ElementTree.fromstring(as_junit(SimpleNamespace(name="s"), [lost])).find("testcase/failure")
+    assert failure.text == "red ?[31m & <b>?"
+    assert rb"a\{b\}\_1 & \textbackslash{}" in as_latex(Sheet("sizes", ("a{b}_1", "\\"), ()))
