@@ -14,21 +14,36 @@ table { display: block; overflow-x: auto; border-collapse: collapse; font-size: 
 th, td { border-bottom: 1px solid #8884; padding: 0.25rem 0.6rem; vertical-align: top; }
 th { text-align: left; }
 img { max-width: 100%; background: white; }
-td[style*="right"] { white-space: nowrap; }
-code { font-size: 0.9em; }
+td[style*="right"], td:not(:last-child) { white-space: nowrap; }
+code { font-size: 0.9em; overflow-wrap: anywhere; }
+td code { display: block; min-width: 20rem; }
+@media (max-width: 50rem) { .figure { overflow-x: auto; } .figure img { max-width: none; zoom: 0.6; } }
+li { margin: 0.4rem 0; }
+summary { cursor: pointer; padding: 0.25rem 0; }
+:target { outline: 2px solid #0072b2; outline-offset: 0.25rem; }
+button { font: inherit; font-size: 0.8em; margin-right: 0.5rem; }
+a { color: light-dark(#0072b2, #56b4e9); }
 """
 
 
-def as_html(title: str, markdown: str) -> bytes:
-    """The page, readable on a phone; pictures in it should be linked to by `inline_png`. Raises `FusionError`."""
+def as_html(title: str, markdown: str, script: str = "") -> bytes:
+    """The page, readable on a phone; pictures in it should be linked to by `inline_png`, and it must make sense without
+    its ``script``. Raises `FusionError`.
+    """
     try:
         from markdown_it import MarkdownIt
     except ImportError as error:
         raise FusionError("HTML pages need markdown-it-py; pip install 'fusion-localization[plots]'") from error
     body = MarkdownIt("commonmark").enable("table").render(markdown)
     viewport = '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+    run = f"<script>{script}</script>" if script else ""
     head = f"<head>{viewport}<title>{html.escape(title)}</title><style>{STYLE}</style></head>"
-    return f'<!doctype html><html lang="en">{head}<body>{body}</body></html>\n'.encode()
+    return f'<!doctype html><html lang="en">{head}<body>{body}{run}</body></html>\n'.encode()
+
+
+def figure(what: str, picture: bytes) -> str:
+    """A PNG as a block of HTML that stands in Markdown: a parser of Markdown would read its whole address as text."""
+    return f'<div class="figure"><img alt="{html.escape(what)}" src="{inline_png(picture)}"></div>'
 
 
 def inline_png(picture: bytes) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 import fusion
 from benchmarks.bench import parse_value
 from benchmarks.lane import Lane, run_lane
+from benchmarks.metrics.track import Track
 from fusion import LogError, ParameterError, PluginError, Truth
 from logs.reader import read_run
 from logs.run import Run, TruthTrack
@@ -45,7 +46,7 @@ def replay(
     if output is not None:
         certificate = {"digest": lane.digest, "estimator": estimator, "seed": str(seed)}
         certificate["parameters"] = json.dumps(dict(options or {}), sort_keys=True)
-        _write(recorded, lane, output, {**recorded.metadata, **certificate})
+        write_replay(recorded, lane, output, {**recorded.metadata, **certificate})
     return lane.digest
 
 
@@ -59,19 +60,31 @@ def _verify(earlier: Path, lane: Lane) -> None:
         )
 
 
-def _write(run: Run, lane: Lane, output: Path, metadata: Mapping[str, str]) -> None:
-    """Messages in the order they came in, each followed by what the estimator said to it."""
+def write_replay(run: Run, lane: Lane, output: Path, metadata: Mapping[str, str]) -> None:
+    """A log of the messages in the order they came in, each followed by what the estimator said to it; from where it
+    crashed on, of the messages alone.
+    """
     truths = _truths(run.truth) if run.truth is not None else []
+    now_ns, answered = 0, 0
     with RunWriter(output, run.world, name=run.name, prior=run.prior, metadata=metadata) as writer:
-        for update, received_ns in zip(lane.updates, lane.track.received_ns.tolist(), strict=True):
-            while truths and truths[-1].time_ns <= received_ns:
-                writer.write_truth(truths.pop())
+        for update, received_ns in zip(lane.updates, Track.of(lane.updates).received_ns.tolist(), strict=True):
+            _write_until(writer, truths, received_ns)
             # The host answers every message with one update of its own; those after it are revisions.
             if not update.revised:
-                writer.write(update.measurement, log_time_ns=max(received_ns, 0))
+                now_ns, answered = max(received_ns, 0), answered + 1
+                writer.write(update.measurement, log_time_ns=now_ns)
             writer.write_update(lane.name, update)
-        for truth in reversed(truths):
-            writer.write_truth(truth)
+        for measurement in run.measurements[answered:]:
+            now_ns = max(now_ns, measurement.time_ns)
+            _write_until(writer, truths, now_ns)
+            writer.write(measurement, log_time_ns=now_ns)
+        _write_until(writer, truths, None)
+
+
+def _write_until(writer: RunWriter, truths: list[Truth], time_ns: int | None) -> None:
+    """Take the true poses up to a time, or all, off the end of ``truths``."""
+    while truths and (time_ns is None or truths[-1].time_ns <= time_ns):
+        writer.write_truth(truths.pop())
 
 
 def _truths(track: TruthTrack) -> list[Truth]:

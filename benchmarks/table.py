@@ -36,6 +36,34 @@ COLUMNS = (
 )
 
 
+LENGTHS = ("pos_", "abs_", "along_", "cross_", "bias_", "drms", "2drms", "max_in_outage", "energy")
+"""How the ids of metrics in metres begin."""
+
+
+class Unit(NamedTuple):
+    """How people want a metric: what to multiply it by, and the unit it is in then."""
+
+    factor: float
+    name: str
+
+    def number(self, value: float) -> str:
+        """A value of the metric, without the unit; – where there is none."""
+        if math.isnan(value):
+            return "–"
+        return "∞" if math.isinf(value) else f"{value * self.factor:.{1 if self.name else 2}f}"
+
+
+def unit_of(metric: str) -> Unit:
+    """Centimetres for lengths, degrees for headings; other metrics as they are.
+
+    >>> unit_of("pos_p75").number(0.123), unit_of("anees").number(1.234)
+    ('12.3', '1.23')
+    """
+    if metric.startswith(LENGTHS) and metric != "pos_auc":
+        return Unit(100.0, "cm")
+    return Unit(math.degrees(1.0), "°") if metric.startswith("head_") else Unit(1.0, "")
+
+
 def ranked(scores: Sequence[Score]) -> list[Score]:
     """The best first: by status, then by the third quartile of the position error, infinite last."""
 

@@ -51,6 +51,7 @@ GROUPS = {
         "report": Verb("benchmarks.report.verb", "the results as one HTML page"),
         "compare": Verb("benchmarks.runner.compare_verb", "which estimator is better, or that the runs cannot tell"),
         "gate": Verb("benchmarks.runner.gate_verb", "may a change land? judged against a baseline"),
+        "replay": Verb("benchmarks.runner.replay_verb", "one cell again, as a log for review"),
         "verify": Verb("benchmarks.runner.verify_verb", "compute stored cells again, they must be the same"),
         "export": Verb("benchmarks.runner.export_verb", "results for other programs"),
     },

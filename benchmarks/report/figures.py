@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -43,8 +43,7 @@ def _cdf(axes: Axes, material: Material) -> None:
             share = np.arange(1, len(finite) + 1) / len(errors)
             step = max(len(finite) // LONGEST_LINE, 1)
             axes.plot(100.0 * finite[::step], 100.0 * share[::step], **_style(material, name))
-    axes.set_xscale("log")
-    plain_ticks(axes.xaxis, (1.0,))
+    _log(axes, "x", (1.0,))
     axes.set_ylim(0.0, 100.0)
     label(axes, "all shown runs, without faults", "position error, cm", "share of instants, %")
     axes.legend(frameon=False, fontsize=8)
@@ -69,17 +68,16 @@ def _paired(axes: Axes, material: Material) -> None:
     """The ranking metric of every run, joined run by run: what the verdicts are made of."""
     grouped = by_contestant(material.results)
     columns = [np.median(score_matrix(grouped[name], material.metric), axis=1) for name in material.contestants]
-    scores = 100.0 * np.stack(columns, axis=1)
+    scores = material.unit.factor * np.stack(columns, axis=1)
     for row in scores:
         axes.plot(range(len(row)), row, color="0.7", linewidth=1, zorder=1)
     for place, name in enumerate(material.contestants):
         known = np.isfinite(scores[:, place])
         colour = plain_colour(_use(material, name))
         axes.scatter(np.full(known.sum(), place), scores[known, place], color=colour, s=24, zorder=2)
-    axes.set_yscale("log")
-    plain_ticks(axes.yaxis)
+    _log(axes, "y")
     axes.set_xticks(range(len(columns)), material.contestants, rotation=30, ha="right")
-    label(axes, "one line per run", "", f"{material.metric}, cm")
+    label(axes, "one line per run", "", material.axis)
 
 
 def _consistency(axes: Axes, material: Material) -> None:
@@ -94,8 +92,7 @@ def _consistency(axes: Axes, material: Material) -> None:
         across = place + np.linspace(-0.2, 0.2, len(values) + 2)[1:-1]
         axes.vlines(across, low, high, color="0.8", linewidth=3, zorder=1)
         axes.scatter(across, values, color=plain_colour(_use(material, name)), s=18, zorder=2)
-    axes.set_yscale("log")
-    plain_ticks(axes.yaxis)
+    _log(axes, "y")
     axes.set_xticks(range(len(material.contestants)), material.contestants, rotation=30, ha="right")
     label(axes, "above 1: more certain than right", "", "ANEES")
 
@@ -144,14 +141,21 @@ def cost(material: Material) -> Figure:
         if name in grouped:
             score = quantile(np.median(score_matrix(grouped[name], material.metric), axis=1), 0.5)
             if np.isfinite(score):
-                axes.scatter(least_us, 100.0 * score, color=plain_colour(_use(material, name)), s=30)
-                axes.annotate(name, (least_us, 100.0 * score), textcoords="offset points", xytext=(5, 3), fontsize=8)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    plain_ticks(axes.xaxis)
-    plain_ticks(axes.yaxis)
-    label(axes, "accuracy against cost", "processor time per measurement, µs", f"{material.metric}, cm")
+                score *= material.unit.factor
+                axes.scatter(least_us, score, color=plain_colour(_use(material, name)), s=30)
+                axes.annotate(name, (least_us, score), textcoords="offset points", xytext=(5, 3), fontsize=8)
+    _log(axes, "x")
+    _log(axes, "y")
+    label(axes, "accuracy against cost", "processor time per measurement, µs", material.axis)
     return figure
+
+
+def _log(axes: Axes, which: Literal["x", "y"], subs: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
+    """A logarithmic axis, where anything is on it: where every estimator was lost, nothing is."""
+    axis, least = {"x": (axes.xaxis, axes.dataLim.minposx), "y": (axes.yaxis, axes.dataLim.minposy)}[which]
+    if np.isfinite(least):
+        axes.set(**{f"{which}scale": "log"})
+        plain_ticks(axis, subs)
 
 
 def _style(material: Material, name: str) -> dict[str, Any]:

@@ -13,11 +13,13 @@ from benchmarks.metrics.deviation import Errors, errors
 from benchmarks.metrics.instants import Answers, Instants, evaluation_instants, match
 from benchmarks.metrics.track import Floats, from_bytes
 from benchmarks.runner.definition import CLEAN, Suite
-from benchmarks.runner.results import RANKED_BY, Result, by_contestant, comparison, median_metrics
+from benchmarks.runner.plan_verb import STORE
+from benchmarks.runner.results import RANKED_BY, Result, by_contestant, comparison, judged, median_metrics
 from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store
 from benchmarks.runner.time_verb import read_timing
 from benchmarks.statistics.verdict import Comparison
+from benchmarks.table import Unit, unit_of
 from fusion import ParameterError, Ranges
 from fusion.values import seconds
 from logs.run import Run
@@ -56,6 +58,39 @@ class Material:
     def __init__(self, suite: Suite, results: Sequence[Result], store: Store, metric: str = RANKED_BY) -> None:
         self.suite, self.results, self.metric = suite, list(results), metric
         self._store = store
+        self._runs: dict[str, Run] = {}
+
+    @property
+    def words(self) -> list[str]:
+        """What names suite and store on a command line."""
+        store = self._store.folder
+        return [self.suite.word, *([] if store == STORE else ["--store", str(store.resolve())])]
+
+    def anchor(self, result: Result) -> str:
+        """What links to the entry of a cell name."""
+        return self._anchors[_ids(result)]
+
+    def anchor_of_all(self, contestant: str) -> str:
+        """What links to all cells of a contestant name."""
+        return f"all-{self.contestants.index(contestant)}"
+
+    @cached_property
+    def _anchors(self) -> dict[tuple[str, str, str, int], str]:
+        return {_ids(result): f"cell-{number}" for number, result in enumerate(self.results)}
+
+    @property
+    def unit(self) -> Unit:
+        """Of what is compared."""
+        return unit_of(self.metric)
+
+    @property
+    def axis(self) -> str:
+        """What is compared, for an axis."""
+        return ", ".join(filter(None, (self.metric, self.unit.name)))
+
+    def text(self, value: float) -> str:
+        """A value of what is compared, with its unit."""
+        return f"{self.unit.number(value)} {self.unit.name}".rstrip()
 
     @cached_property
     def contestants(self) -> list[str]:
@@ -66,7 +101,7 @@ class Material:
     @cached_property
     def comparison(self) -> Comparison | None:
         """All pairs; None where nothing can be compared, such as runs without truth."""
-        if len(self.contestants) < 2:
+        if len(self.contestants) < 2 or not self.scored_runs:
             return None
         try:
             return comparison(self.results, self.metric)
@@ -80,9 +115,14 @@ class Material:
 
     @cached_property
     def scored_runs(self) -> list[str]:
-        """The first runs that have truth."""
-        known = {result.cell.run.id for result in self.results if result.metrics}
+        """The first runs that count and have truth."""
+        known = {result.cell.run.id for result in judged(self.results) if "availability" in result.metrics}
         return [run.id for run in self.suite.runs if run.id in known][:SHOWN_RUNS]
+
+    @cached_property
+    def has_errors(self) -> bool:
+        """Whether there is anything to draw: an estimator that answered, in a run with truth."""
+        return any(result.worst_at_s is not None for result in judged(self.results))
 
     @cached_property
     def series(self) -> dict[tuple[str, str], Series]:
@@ -107,8 +147,10 @@ class Material:
         return fix_error(run.world.anchors, Places.of_poses(run.world, true.x, true.y, true.heading), radio_of(run))
 
     def run(self, run_id: str) -> Run:
-        """The run itself, for its map."""
-        return open_run(self.suite.run(run_id), self.suite.folder)
+        """The run itself; those that are shown are few, and are kept."""
+        if run_id not in self._runs:
+            self._runs[run_id] = open_run(self.suite.run(run_id), self.suite.folder)
+        return self._runs[run_id]
 
     def _series(self, result: Result) -> Series:
         cell, rules = result.cell, result.cell.evaluation
@@ -117,3 +159,8 @@ class Material:
         instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
         track, _ = from_bytes(self._store.read("estimates", cell.estimate_key, "track.npz"))
         return Series(result, instants, match(instants, track, max_age_s=rules.max_age_s))
+
+
+def _ids(result: Result) -> tuple[str, str, str, int]:
+    cell = result.cell
+    return cell.run.id, cell.contestant.id, cell.fault.id, cell.seed

@@ -1,55 +1,61 @@
-"""The tables of a report."""
+"""The tables of a report. Their numbers lead to the cells they come from."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
+from benchmarks.cell import LEAST_AVAILABILITY
 from benchmarks.metrics.bound import eff_crlb
 from benchmarks.metrics.credibility import credibility_metrics
 from benchmarks.metrics.posterior import eff_pcrlb, posterior_bound
 from benchmarks.metrics.score import quantile
 from benchmarks.metrics.track import Floats
+from benchmarks.report.cells import link, link_all, nearest, nearest_to
 from benchmarks.report.material import Material
-from benchmarks.report.worst import Moment
+from benchmarks.report.worst import command, worst_moments
 from benchmarks.runner.definition import CLEAN
-from benchmarks.runner.results import ALIVE, Result, by_contestant, median_metrics, score_matrix
+from benchmarks.runner.results import ALIVE, Result, by_contestant, by_run, median_metrics, score_matrix
 from benchmarks.sheet import Sheet
 from benchmarks.statistics.statistics import mean_interval
-from benchmarks.table import COLUMNS, as_text
+from benchmarks.table import COLUMNS, Unit, as_text
 
 
 def leaderboard(material: Material) -> Sheet:
     """The best first, with the letters that say who cannot be told apart, and the worst run beside the median."""
     shown = [column for column in COLUMNS if column.key != "cpu_per_measurement_s"]
-    grouped = by_contestant(material.results)
+    grouped, unit = by_contestant(material.results), material.unit
     letters = material.comparison.letters if material.comparison else {}
     rows = []
     for name in material.contestants:
         own = grouped[name]
         medians, alive = median_metrics(own), sum(result.status in ALIVE for result in own)
         scores = np.median(score_matrix(own, material.metric), axis=1)
-        worst = f"{100.0 * scores.max():.1f}" if np.isfinite(scores.max()) else "∞"
-        numbers = (as_text(column, medians) for column in shown)
-        rows.append((name, letters.get(name, "–"), f"{alive}/{len(own)}", _interval_cm(scores), worst, *numbers))
+        worst = unit.number(scores.max()) if material.scored_runs else "–"
+        worst = link(material, worst, nearest(own, material.metric, scores.max()))
+        head = (letters.get(name, "–"), link_all(material, f"{alive}/{len(own)}", name))
+        over_runs = link_all(material, _interval(scores, unit), name)
+        numbers = (
+            link(material, as_text(column, medians), nearest(own, column.key, medians.get(column.key, math.inf)))
+            for column in shown
+        )
+        rows.append((name, *head, over_runs, worst, *numbers))
     titles = (column.title.replace("\n", " ") for column in shown)
-    over_runs = (f"{material.metric} over runs, cm [95 %]", f"worst run, {material.metric} cm")
-    head = ("estimator", "alike", "cells ok", *over_runs, *titles)
-    return Sheet("Leaderboard: medians over cells without faults", head, tuple(rows))
+    metric = f"{material.metric} {unit.name}".rstrip()
+    titled = ("estimator", "alike", "cells ok", f"{metric} over runs [95 %]", f"worst run, {metric}", *titles)
+    return Sheet("Leaderboard: medians over cells without faults", titled, tuple(rows))
 
 
-def _interval_cm(scores: Floats) -> str:
+def _interval(scores: Floats, unit: Unit) -> str:
     """Geometric mean over runs with its t interval; the runs that were lost are not in it, and are counted."""
     alive = scores[np.isfinite(scores) & (scores > 0.0)]
     if len(alive) < 2:
         return "–"
     found = mean_interval(np.log(alive))
-    mean, low, high = (100.0 * math.exp(min(float(value), 50.0)) for value in found[:3])
+    mean, low, high = (unit.number(math.exp(min(float(value), 50.0))) for value in found[:3])
     gone = f" ({len(scores) - len(alive)} lost)" if len(alive) < len(scores) else ""
-    return f"{mean:.0f} [{low:.0f}, {high:.0f}]{gone}"
+    return f"{mean} [{low}, {high}]{gone}"
 
 
 def faults(material: Material) -> Sheet:
@@ -58,15 +64,21 @@ def faults(material: Material) -> Sheet:
     rows = []
     for name in material.contestants:
         base = np.median(score_matrix(clean[name], material.metric), axis=1)
-        cells = []
-        for fault in material.suite.faults[1:]:
-            own = by_contestant(material.results, fault.id)[name]
-            ratio = quantile(np.median(score_matrix(own, material.metric), axis=1) / base, 0.5)
-            lost = sum(result.status not in ALIVE for result in own)
-            cells.append(_times(ratio) + (f" ({lost} lost)" if lost else ""))
-        rows.append((name, *cells))
+        rows.append((name, *(_under(material, name, base, fault.id) for fault in material.suite.faults[1:])))
     head = ("estimator", *(fault.id for fault in material.suite.faults if fault.id != CLEAN))
     return Sheet(f"Faults: {material.metric} as a multiple of the clean run's, median over runs", head, tuple(rows))
+
+
+def _under(material: Material, name: str, base: Floats, fault: str) -> str:
+    """One contestant under one fault; leads to the run that stands in the middle."""
+    own = by_contestant(material.results, fault)[name]
+    scores = np.median(score_matrix(own, material.metric), axis=1)
+    ratios = np.where(np.isfinite(base), scores / base, np.inf)
+    ratio = quantile(ratios, 0.5)
+    lost = sum(result.status not in ALIVE for result in own)
+    row = nearest_to(ratios.tolist(), ratio)
+    text = _times(ratio) + (f" ({lost} lost)" if lost else "")
+    return link(material, text, nearest(list(by_run(own).values())[row], material.metric, scores[row]))
 
 
 def _times(ratio: float) -> str:
@@ -81,9 +93,11 @@ def limits(material: Material) -> Sheet:
         cells = []
         for run_id, bound in bounds.items():
             series = material.series.get((run_id, name))
-            same = series is not None and np.array_equal(series.instants.time_ns, bound.time_ns)
-            ratio = eff_pcrlb(series.error_m[None], bound.error_m[None]) if series is not None and same else math.nan
-            cells.append("–" if math.isnan(ratio) else f"{ratio:.2f}×")
+            if series is None or not np.array_equal(series.instants.time_ns, bound.time_ns):
+                cells.append("–")
+                continue
+            ratio = eff_pcrlb(series.error_m[None], bound.error_m[None])
+            cells.append("–" if math.isnan(ratio) else link(material, f"{ratio:.2f}×", series.result))
         rows.append((name, *cells))
     title = "Times the physical limit: RMSE over the posterior Cramér-Rao bound of the run (0.89 is perfect in one run)"
     return Sheet(title, ("estimator", *bounds), tuple(rows))
@@ -118,23 +132,38 @@ def _decibels(scores: dict[str, float]) -> str:
     return "–" if math.isnan(scores["nci"]) else f"{scores['nci']:.1f} ({scores['incl']:+.1f})"
 
 
-def moments(found: Sequence[Moment], folder: Path) -> Sheet:
-    """Where to look first, for a suite in ``folder``."""
+def moments(material: Material) -> Sheet:
+    """Where to look first."""
     rows = tuple(
-        (one.run.id, one.contestant.id, f"{one.at_s:.1f}", f"{100.0 * one.error_m:.0f}", one.command(folder))
-        for one in found
+        (
+            one.cell.run.id,
+            one.cell.contestant.id,
+            f"{one.worst_at_s:.1f}",
+            link(material, f"{100.0 * one.metrics['pos_max']:.0f}", one),
+            f"`{command(one, material.words)}`",
+        )
+        for one in worst_moments(material.results)
     )
     return Sheet("Worst moments", ("run", "estimator", "time, s", "error, cm", "command"), rows, prose=True)
 
 
-def lost(results: Sequence[Result]) -> Sheet:
+def lost(material: Material) -> Sheet:
     """Every cell that did not survive, and why."""
     rows = tuple(
-        (str(result.cell), result.status, result.error or "fewer than half of its answers were valid")
-        for result in results
+        (link(material, str(result.cell), result), result.status, _why(result))
+        for result in material.results
         if result.status not in ALIVE
     )
     return Sheet("Lost cells", ("cell", "status", "why"), rows, prose=True)
+
+
+def _why(result: Result) -> str:
+    if result.error:
+        return "`" + result.error.replace("`", "'") + "`"  # what a plug-in says is no Markdown
+    available = result.metrics.get("availability", math.nan)
+    if available < LEAST_AVAILABILITY:
+        return f"only {100.0 * available:.0f} % of the instants had a valid answer"
+    return "it answered with numbers that are none, or its median error is infinite"
 
 
 def provenance(material: Material) -> Sheet:
@@ -151,9 +180,14 @@ def _content(material: Material, run_id: str) -> str:
 
 
 def contestants(material: Material) -> Sheet:
-    """What was run under each name."""
+    """What was run under each name, and on which runs its parameters were chosen."""
     rows = tuple(
-        (one.id, one.use, ", ".join(f"{key} = {value}" for key, value in one.params.items()) or "defaults")
+        (
+            one.id,
+            one.use,
+            ", ".join(one.tuned_on) or "–",
+            ", ".join(f"{key} = {value}" for key, value in one.params.items()) or "defaults",
+        )
         for one in material.suite.contestants
     )
-    return Sheet("Estimators", ("id", "estimator", "parameters"), rows, prose=True)
+    return Sheet("Estimators", ("id", "estimator", "tuned on", "parameters"), rows, prose=True)

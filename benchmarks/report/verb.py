@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import platform
+import shlex
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,13 +14,16 @@ import numpy as np
 import fusion
 from benchmarks.metrics.credibility import LEAST_SEEDS
 from benchmarks.output import write
-from benchmarks.page import as_html, inline_png
+from benchmarks.page import as_html, figure
 from benchmarks.plotting import as_png, require_matplotlib
 from benchmarks.report import tables
+from benchmarks.report.cells import SCRIPT, counted, entries
 from benchmarks.report.figures import FIGURES
 from benchmarks.report.material import Material
-from benchmarks.report.worst import worst_moments
-from benchmarks.runner.compare_verb import sheet, stored_results
+from benchmarks.report.pairs import deciding, pairs, run_by_run
+from benchmarks.report.sensitivity import advice, curves, sensitivity, sweeps
+from benchmarks.runner.compare_verb import stored_results
+from benchmarks.runner.definition import TUNE
 from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.results import RANKED_BY
 from benchmarks.runner.store import Store
@@ -38,25 +42,54 @@ EXPLAINED = {
     "over_time": "Gaps are instants without a valid answer.",
     "maps": "The best estimator's track, coloured by its error, over the true path; triangles are anchors, "
     "contours the least error of a fix from one reading of each (Cramér-Rao).",
+    "parameters": "Below 1 is better than the default. A grey line is a run, dashed where it is for tuning; bars are "
+    "the 95 % interval over the test runs.",
     "cost": "Measured alone on one machine by `fusion bench time`. Lower left is better.",
 }
 
 
-def report(material: Material, command: str, *, limit: bool = False) -> str:
+def report(material: Material, *, limit: bool = False) -> str:
     """The page as Markdown with its figures in it; with ``limit`` also how far from the physical limit all are."""
     suite = material.suite
+    counts = ((len(suite.runs), "run"), (len(material.contestants), "estimator"), (len(suite.faults) - 1, "fault"))
+    made = ", ".join(counted(*count) for count in (*counts, (suite.seeds, "seed")))
     about = (
-        f"{len(suite.runs)} runs, {len(material.contestants)} estimators, {len(suite.faults)} fault sets, "
-        f"{suite.seeds} seeds: {len(material.results)} cells. Errors are horizontal distances to the truth, raw: "
-        "nothing is aligned. An instant without a valid answer counts as infinite."
+        f"{made}: {counted(len(material.results), 'cell')}. Errors are horizontal distances to the truth, raw: nothing "
+        "is aligned. An instant without a valid answer counts as infinite. Every number that is a link leads to the "
+        "cell it comes from, and to the command that opens Rerun where that cell erred most."
     )
-    parts = [f"# {suite.name}", *_verdicts(material), about, *map(as_markdown, _sheets(material, limit=limit))]
-    if material.scored_runs:
+    parts = [
+        f"# {suite.name}",
+        *_verdicts(material),
+        about,
+        *_about_runs(material),
+        *map(as_markdown, _sheets(material, limit=limit)),
+    ]
+    if material.has_errors:
         for name, draw in FIGURES.items():
             if name == "cost" and not material.timing:
                 continue
-            parts.append(f"![{name}]({inline_png(as_png(draw(material)))})\n\n{EXPLAINED[name]}")
-    return "\n\n".join([*parts, *_provenance(material, command)]) + "\n"
+            parts.append(f"{figure(name, as_png(draw(material)))}\n\n{EXPLAINED[name]}")
+    parts += _sensitivity(material)
+    return "\n\n".join([*parts, *_provenance(material), "**Cells**", entries(material)]) + "\n"
+
+
+def _about_runs(material: Material) -> Iterator[str]:
+    """Which runs do not count, and why."""
+    if blind := sorted({result.cell.run.id for result in material.results if not result.cell.content.truth}):
+        yield f"Without ground truth, and so without an error: {', '.join(blind)}."
+    tune = [run.id for run in material.suite.runs if run.split == TUNE]
+    if len(tune) == len(material.suite.runs):
+        yield "**All runs are for tuning**: parameters may have been chosen on what they are scored on here."
+    elif tune:
+        named = ", ".join(tune)
+        yield f"Only for tuning, and in no number but those of the parameters and of their own cells: {named}."
+
+
+def as_page(material: Material, *, limit: bool = False) -> bytes:
+    """The report as one HTML file; raises `FusionError` without matplotlib or markdown-it."""
+    require_matplotlib()
+    return as_html(material.suite.name, report(material, limit=limit), SCRIPT)
 
 
 def _verdicts(material: Material) -> Iterator[str]:
@@ -65,7 +98,11 @@ def _verdicts(material: Material) -> Iterator[str]:
         yield "Nothing can be compared here: give at least two estimators, and runs with truth."
         return
     best = material.contestants[0]
-    told = [verdict.sentence for verdict in material.comparison.verdicts if best in (verdict.first, verdict.second)]
+    told = [
+        f"{verdict.sentence} ([where](#{material.anchor(deciding(material, verdict))}))"
+        for verdict in material.comparison.verdicts
+        if best in (verdict.first, verdict.second)
+    ]
     yield "\n".join(f"- {sentence}" for sentence in told + _within_the_run(material))
 
 
@@ -83,7 +120,8 @@ def _within_the_run(material: Material) -> list[str]:
 def _sheets(material: Material, *, limit: bool) -> Iterator[Sheet]:
     yield tables.leaderboard(material)
     if material.comparison is not None:
-        yield sheet(material.comparison)
+        yield pairs(material, material.comparison)
+        yield run_by_run(material)
     if limit and material.scored_runs:
         yield tables.limits(material)
         yield tables.fixes(material)
@@ -91,13 +129,22 @@ def _sheets(material: Material, *, limit: bool) -> Iterator[Sheet]:
         yield tables.faults(material)
         if material.suite.seeds >= LEAST_SEEDS and material.scored_runs:
             yield tables.credibility(material)
-    if found := worst_moments(material):
-        yield tables.moments(found, material.suite.folder)
-    if (lost := tables.lost(material.results)).rows:
-        yield lost
+    for found in (tables.moments(material), tables.lost(material)):
+        if found.rows:
+            yield found
 
 
-def _provenance(material: Material, command: str) -> Iterator[str]:
+def _sensitivity(material: Material) -> Iterator[str]:
+    """Nothing without a grid, or where nothing was scored."""
+    found = sweeps(material) if material.has_errors else []
+    if found:
+        yield as_markdown(sensitivity(material, found))
+        yield "\n".join(f"- {sentence}" for sentence in advice(found))
+        yield f"{figure('parameters', as_png(curves(material, found)))}\n\n{EXPLAINED['parameters']}"
+
+
+def _provenance(material: Material) -> Iterator[str]:
+    command = shlex.join(["fusion", "bench", "run", *material.words])
     yield as_markdown(tables.provenance(material))
     yield as_markdown(tables.contestants(material))
     yield (
@@ -120,12 +167,12 @@ def run(arguments: argparse.Namespace) -> int:
     require_matplotlib()
     suite, results = stored_results(arguments)
     material = Material(suite, results, Store(arguments.store), arguments.metric)
-    page = report(material, f"fusion bench run {arguments.suite.name}", limit=arguments.limit)
-    targets = [(arguments.markdown, page.encode())]
+    targets = {}
+    if arguments.markdown:
+        targets[arguments.markdown] = report(material, limit=arguments.limit).encode()
     if arguments.html or not arguments.markdown:
-        targets.append((arguments.html or Path(f"{suite.name}.html"), as_html(suite.name, page)))
-    for path, content in targets:
-        if path is not None:
-            write(path, content)
-            sys.stdout.write(f"{path}\n")
+        targets[arguments.html or Path(f"{suite.name}.html")] = as_page(material, limit=arguments.limit)
+    for path, content in targets.items():
+        write(path, content)
+        sys.stdout.write(f"{path}\n")
     return 0

@@ -9,10 +9,13 @@ from pathlib import Path
 
 
 def review_command(
-    run: Path, estimator: str, at_s: float, *, params: Mapping[str, object] | None = None, seed: int = 0
+    run: Path, estimator: str, at_s: float | None, *, params: Mapping[str, object] | None = None, seed: int = 0
 ) -> str:
-    """``fusion review`` of one estimator, the time cursor ``at_s`` after the start of the run; quoted for a shell."""
-    words = ["fusion", "review", str(run), "--estimators", estimator, "--at", f"{at_s:.2f}"]
+    """``fusion review`` of one estimator, the time cursor ``at_s`` after the start of the run (None: where it opens);
+    quoted for a shell.
+    """
+    words = ["fusion", "review", str(run), "--estimators", estimator]
+    words += [] if at_s is None else ["--at", f"{at_s:.2f}"]
     for key, value in (params or {}).items():
         words += ["--set", f"{estimator}.{key}={json.dumps(value)}"]
     return shlex.join(words + (["--seed", str(seed)] if seed else []))

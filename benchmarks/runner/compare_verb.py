@@ -13,7 +13,7 @@ from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.results import RANKED_BY, Result, comparison, read_results
 from benchmarks.runner.store import Store
 from benchmarks.sheet import Sheet, print_sheets
-from benchmarks.statistics.verdict import Comparison
+from benchmarks.statistics.verdict import Comparison, Verdict
 from fusion import ParameterError, SuiteError
 from fusion.errors import did_you_mean
 
@@ -40,10 +40,9 @@ def sheet(judged: Comparison) -> Sheet:
     """Every pair as one row."""
     rows = []
     for verdict in judged.verdicts:
-        ratio, low, high = verdict.ratio
         runs = f"{verdict.compared} of {verdict.runs}"
         numbers = (
-            f"{ratio:.3f} [{low:.3f}, {high:.3f}]",
+            _ratio(verdict),
             runs,
             f"{verdict.holm_p:.2g}",
             f"{verdict.signed_rank.p:.2g}",
@@ -51,6 +50,14 @@ def sheet(judged: Comparison) -> Sheet:
         rows.append((f"{verdict.first} / {verdict.second}", *numbers, verdict.winner or "cannot tell"))
     head = ("pair", "ratio [95 %]", "runs compared", "p, Holm", "p, signed ranks", "better")
     return Sheet(f"Pairs on {judged.metric}", head, tuple(rows))
+
+
+def _ratio(verdict: Verdict) -> str:
+    """With its interval, which one run does not have."""
+    ratio, low, high = verdict.ratio
+    if verdict.compared == 0:
+        return "–"
+    return f"{ratio:.3f} [{low:.3f}, {high:.3f}]" if verdict.compared > 1 else f"{ratio:.3f}"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -20,6 +20,8 @@ CATALOGUE = "catalogue"
 """The file beside the built-in suites that tells where recordings come from."""
 CLEAN = "clean"
 """The fault that is none; every suite has it."""
+TUNE, TEST = "tune", "test"
+"""What a run is for: parameters are chosen on the first kind and judged on the second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,7 @@ class RunSource:
     scenario: str | None = None
     seed: int = 0
     duration_s: float | None = None
-    split: str = "test"
+    split: str = TEST
     catalogue: str | None = None
     """Where a log that is not there comes from: a set of `benchmarks/suites/catalogue.toml`."""
 
@@ -70,14 +72,14 @@ class Contestant:
     tuned_on: tuple[str, ...] = ()
 
     def combinations(self) -> list[Contestant]:
-        """One contestant per point of the grid."""
+        """One contestant per point of the grid, which it keeps: what else was tried belongs to a result."""
         if not self.grid:
             return [self]
         found = []
         for values in product(*self.grid.values()):
             chosen = dict(zip(self.grid, values, strict=True))
             suffix = ",".join(f"{key}={value}" for key, value in chosen.items())
-            found.append(Contestant(f"{self.id}[{suffix}]", self.use, {**self.params, **chosen}, {}, self.tuned_on))
+            found.append(replace(self, id=f"{self.id}[{suffix}]", params={**self.params, **chosen}))
         return found
 
 
@@ -136,7 +138,17 @@ class Suite:
     contestants: tuple[Contestant, ...]
     faults: tuple[FaultSet, ...]
     gate: Gate
-    folder: Path
+    path: Path
+
+    @property
+    def folder(self) -> Path:
+        """Where its paths begin."""
+        return self.path.parent
+
+    @property
+    def word(self) -> str:
+        """What names it on a command line, wherever that is typed on this machine."""
+        return self.path.stem if builtin_suites().get(self.path.stem) == self.path else str(self.path)
 
     def run(self, run_id: str) -> RunSource:
         """The run of that id."""
@@ -189,7 +201,7 @@ def _checked(written: _File, path: Path) -> Suite:
         contestants,
         faults,
         written.gate,
-        path.resolve().parent,
+        path.resolve(),
     )
 
 
@@ -206,8 +218,8 @@ def _check_run(run: RunSource, where: str) -> None:
         raise SuiteError(f"{where}: give either mcap, a log, or scenario, a simulated run")
     if run.topics and run.world is None:
         raise SuiteError(f"{where}: topics are of a foreign bag, which needs a world too; our own logs need neither")
-    if run.split not in ("tune", "test"):
-        raise SuiteError(f"{where}: split is {run.split!r}; {did_you_mean(run.split, ('tune', 'test'))}")
+    if run.split not in (TUNE, TEST):
+        raise SuiteError(f"{where}: split is {run.split!r}; {did_you_mean(run.split, (TUNE, TEST))}")
 
 
 def _check_head(head: _Head, where: str) -> None:
@@ -226,7 +238,7 @@ def _check_tuning(written: _File, path: Path) -> None:
         for run_id in estimator.tuned_on:
             if run_id not in splits:
                 raise SuiteError(f"{path}: {estimator.id} is tuned on {run_id!r}; {did_you_mean(run_id, splits)}")
-            if splits[run_id] == "test":
+            if splits[run_id] == TEST:
                 raise SuiteError(
                     f"{path}: {estimator.id} was tuned on {run_id}, which is a test run: its score there would be "
                     'worth nothing; give that run split = "tune"'

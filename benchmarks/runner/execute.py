@@ -8,23 +8,27 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from benchmarks.cell import status_of
 from benchmarks.faults.faults import apply_faults
 from benchmarks.lane import Lane, run_lane
 from benchmarks.metrics.innovations import innovation_metrics
 from benchmarks.metrics.instants import evaluation_instants, match
 from benchmarks.metrics.interpolation import meet
-from benchmarks.metrics.score import errors, metrics
+from benchmarks.metrics.score import Errors, errors, metrics
 from benchmarks.metrics.track import Track, from_bytes, to_bytes
+from benchmarks.review.frame import Frame
 from benchmarks.runner.definition import CLEAN, CellLimits
 from benchmarks.runner.plan import Cell, read_faults
 from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store, to_json
 from benchmarks.workers import Limits, Loss, compute
+from fusion.values import seconds
 from logs.run import Run
 
 LOST = {
-    Loss.CRASHED: "its process died, twice; run it alone with --workers 1 to see why",
+    Loss.CRASHED: "its process died, twice; `fusion bench replay` runs it alone, to see why",
     Loss.TIMEOUT: "it took longer than limits.wall_s of the suite",
     Loss.OUT_OF_MEMORY: "it took more memory than limits.rss_mb of the suite",
 }
@@ -54,7 +58,7 @@ def carry_out(task: tuple[Cell, Path]) -> str:
     store = Store(folder)
     if not store.has("estimates", cell.estimate_key):
         run = faulty_run(cell)
-        keep(cell, store, run_lane(run, cell.contestant.use, cell.contestant.params, cell.seed), len(run.measurements))
+        keep(cell, store, fold(cell, run), run)
     return score(cell, store)
 
 
@@ -62,8 +66,13 @@ def give_up(task: tuple[Cell, Path], loss: Loss) -> str:
     """Keep what became of a cell whose process did not survive it: a failure is a result too."""
     cell, folder = task
     store = Store(folder)
-    keep(cell, store, Lane(cell.contestant.use, (), "", 0.0, LOST[loss]), 0, ended=loss.value)
+    keep(cell, store, Lane(cell.contestant.use, (), "", 0.0, LOST[loss]), None, ended=loss.value)
     return score(cell, store)
+
+
+def fold(cell: Cell, run: Run) -> Lane:
+    """What the contestant of a cell makes of its run, faults and all."""
+    return run_lane(run, cell.contestant.use, cell.contestant.params, cell.seed)
 
 
 def faulty_run(cell: Cell) -> Run:
@@ -76,14 +85,15 @@ def faulty_run(cell: Cell) -> Run:
     return apply_faults(named, faults, suite_seed=cell.suite_seed, fault_id=cell.fault.id, seed=cell.seed)
 
 
-def keep(cell: Cell, store: Store, lane: Lane, measurements: int, ended: str = "crashed") -> None:
-    """Put the estimate of a cell into the store."""
+def keep(cell: Cell, store: Store, lane: Lane, run: Run | None, ended: str = "crashed") -> None:
+    """Put the estimate of a cell into the store; ``run`` None: it was lost with its process."""
     result = {
         "cell": str(cell),
         "ended": ended if lane.error else "ok",
         "error": lane.error,
         "digest": lane.digest,
-        "measurements": measurements,
+        "measurements": 0 if run is None else len(run.measurements),
+        "start_ns": None if run is None else Frame.around(run).start_ns,
         "fates": lane.fates.counts,
         "nis_mean": lane.fates.nis_mean,
     }
@@ -97,27 +107,53 @@ def score(cell: Cell, store: Store) -> str:
     if not store.has("scores", cell.score_key):
         made = store.read_json("estimates", cell.estimate_key, "result.json")
         track, fates = from_bytes(store.read("estimates", cell.estimate_key, "track.npz"))
-        measured = _metrics(cell, track)
+        judged = _errors(cell, track)
+        measured = _metrics(judged)
         said = (measured.get("availability", math.nan), measured.get("pos_p50", math.nan))
         status = made["ended"] if made["error"] else status_of(track, *said)
         measured |= innovation_metrics(fates)
-        found = {"status": status, "metrics": {key: _finite(value) for key, value in measured.items()}}
+        numbers = {key: _finite(value) for key, value in measured.items()}
+        found = {"status": status, "metrics": numbers, "worst_at_s": _worst_at_s(judged, made.get("start_ns"))}
         store.write("scores", cell.score_key, {"result.json": to_json(found)})
     return str(store.read_json("scores", cell.score_key, "result.json")["status"])
 
 
-def _metrics(cell: Cell, track: Track) -> dict[str, float]:
-    """Empty without truth."""
+class _Judged(NamedTuple):
+    """Errors, and of how much of the run there was an answer where they do not say it themselves."""
+
+    errors: Errors
+    availability: float | None
+
+
+def _errors(cell: Cell, track: Track) -> _Judged | None:
+    """None without truth."""
     truth = open_run(cell.run, cell.folder).truth
     if truth is None or len(truth) == 0:
-        return {}
+        return None
     rules = cell.evaluation
     if rules.reading == "interp":
         met = meet(truth, track, gap_s=rules.gap_s)
-        scores = metrics(errors(met.instants, met.answers, met.weight))
-        return {**scores, "availability": met.availability}
+        return _Judged(errors(met.instants, met.answers, met.weight), met.availability)
     instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
-    return metrics(errors(instants, match(instants, track, max_age_s=rules.max_age_s)))
+    return _Judged(errors(instants, match(instants, track, max_age_s=rules.max_age_s)), None)
+
+
+def _metrics(judged: _Judged | None) -> dict[str, float]:
+    if judged is None:
+        return {}
+    scores = metrics(judged.errors)
+    return scores if judged.availability is None else {**scores, "availability": judged.availability}
+
+
+def _worst_at_s(judged: _Judged | None, start_ns: int | None) -> float | None:
+    """When the position error was greatest, since the start of the run; None where there was no answer at all."""
+    if judged is None or start_ns is None:
+        return None
+    error_m = np.where(np.isfinite(judged.errors.position), judged.errors.position, -1.0)
+    worst = int(error_m.argmax()) if len(error_m) else 0
+    if len(error_m) == 0 or error_m[worst] < 0.0:
+        return None
+    return seconds(int(judged.errors.time_ns[worst]) - start_ns)
 
 
 def _finite(value: float) -> float | str | None:

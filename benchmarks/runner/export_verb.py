@@ -17,7 +17,14 @@ from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.results import ALIVE, Result, flat, leaderboard, record
 from benchmarks.sheet import Sheet, as_markdown
 
-LATEX_SPECIAL = {"_": r"\_", "%": r"\%", "&": r"\&", "#": r"\#", "°": r"$^\circ$", "∞": r"$\infty$", "\n": " "}
+LATEX_SPECIAL = {letter: f"\\{letter}" for letter in "_%&#${}"} | {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "°": r"$^\circ$",
+    "∞": r"$\infty$",
+    "\n": " ",
+}
 
 
 def as_csv(results: Sequence[Result]) -> bytes:
@@ -54,8 +61,15 @@ def as_junit(suite: Suite, results: Sequence[Result]) -> bytes:
             root, "testcase", classname=f"{cell.run.id}.{cell.fault.id}", name=f"{cell.contestant.id}[{cell.seed}]"
         )
         if result.status not in ALIVE:
-            ElementTree.SubElement(case, "failure", message=result.status).text = result.error or result.status
+            ElementTree.SubElement(case, "failure", message=result.status).text = _printable(
+                result.error or result.status
+            )
     return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
+
+
+def _printable(text: str) -> str:
+    """XML has no control characters, and an estimator may say anything."""
+    return "".join(letter if letter.isprintable() or letter == "\n" else "?" for letter in text)
 
 
 Writer = Callable[[Suite, Sequence[Result], Path], None]

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.metrics.score import METRICS_VERSION, quantile
 from benchmarks.metrics.track import Floats
-from benchmarks.runner.definition import CLEAN, Suite
+from benchmarks.runner.definition import CLEAN, TEST, Suite
 from benchmarks.runner.execute import read_metrics
 from benchmarks.runner.plan import Cell
 from benchmarks.runner.store import Store
@@ -24,7 +24,9 @@ ALIVE = ("ok", "unscored")
 
 
 class Result(NamedTuple):
-    """One cell's score: infinite and NaN metrics are what `benchmarks.metrics.score` says they are."""
+    """One cell's score: infinite and NaN metrics are what `benchmarks.metrics.score` says they are. ``worst_at_s``:
+    when its position error was greatest, since the start of the run; None where there is no error.
+    """
 
     cell: Cell
     status: str
@@ -32,6 +34,7 @@ class Result(NamedTuple):
     digest: str
     metrics: Mapping[str, float]
     facts: Mapping[str, object]
+    worst_at_s: float | None
 
 
 def read_results(cells: Iterable[Cell], store: Store) -> list[Result]:
@@ -41,16 +44,33 @@ def read_results(cells: Iterable[Cell], store: Store) -> list[Result]:
         if store.has("scores", cell.score_key):
             scored = store.read_json("scores", cell.score_key, "result.json")
             made = store.read_json("estimates", cell.estimate_key, "result.json")
-            found.append(Result(cell, scored["status"], made["error"], made["digest"], read_metrics(scored), made))
+            told = (scored["status"], made["error"], made["digest"], read_metrics(scored), made, scored["worst_at_s"])
+            found.append(Result(cell, *told))
     return found
 
 
+def judged(results: Sequence[Result]) -> list[Result]:
+    """The results that count: those of the test runs with ground truth; where there is none such, of the test runs, or
+    of all.
+    """
+    test = [result for result in results if result.cell.run.split == TEST] or list(results)
+    return [result for result in test if result.cell.content.truth] or test
+
+
 def by_contestant(results: Sequence[Result], fault: str = CLEAN) -> dict[str, list[Result]]:
-    """The results under one fault, by contestant, in the suite's order."""
+    """The results under one fault that count, by contestant, in the suite's order."""
     grouped: dict[str, list[Result]] = {}
-    for result in results:
+    for result in judged(results):
         if result.cell.fault.id == fault:
             grouped.setdefault(result.cell.contestant.id, []).append(result)
+    return grouped
+
+
+def by_run(results: Sequence[Result]) -> dict[str, list[Result]]:
+    """Results by run, in the suite's order."""
+    grouped: dict[str, list[Result]] = {}
+    for result in results:
+        grouped.setdefault(result.cell.run.id, []).append(result)
     return grouped
 
 
@@ -77,8 +97,7 @@ def leaderboard(results: Sequence[Result], fault: str = CLEAN) -> Sheet:
 
 def score_matrix(results: Sequence[Result], metric: str) -> Floats:
     """One contestant's scores under one fault, (runs, seeds), both in the suite's order."""
-    runs = list(dict.fromkeys(result.cell.run.id for result in results))
-    rows = [[result.metrics.get(metric, math.inf) for result in results if result.cell.run.id == run] for run in runs]
+    rows = [[result.metrics.get(metric, math.inf) for result in own] for own in by_run(results).values()]
     return np.array([[math.inf if math.isnan(value) else value for value in row] for row in rows], dtype=np.float64)
 
 

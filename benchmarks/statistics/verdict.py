@@ -116,7 +116,8 @@ class Verdict:
 
     def _uncertainty(self) -> str:
         if self.compared < 2:
-            return f"{self.compared} of {self.runs} runs can be compared, record at least 6, better 12"
+            runs = "run" if self.runs == 1 else "runs"
+            return f"{self.compared} of {self.runs} {runs} can be compared, record at least 6, better 12"
         ratio = _ratio_text(*self.ratio)
         if self.p < 1.0 - self.level:
             return f"{ratio}, which alone would count, but among so many pairs may be chance (p {self.holm_p:.2g})"

@@ -1,6 +1,7 @@
 """The report of a suite: one page, no network, every part of it there, drawn by a real browser without errors."""
 
-import argparse
+import html
+import math
 import re
 import shlex
 import shutil
@@ -11,19 +12,24 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics.bound import rssi_fix_bound
+from benchmarks.page import as_html
+from benchmarks.report.cells import SCRIPT
 from benchmarks.report.figures import FIGURES
 from benchmarks.report.material import Material
+from benchmarks.report.sensitivity import WITHOUT_TUNE
 from benchmarks.report.tables import credibility, fixes
 from benchmarks.report.verb import report
-from benchmarks.report.worst import as_log, worst_moments
+from benchmarks.report.worst import command, worst_moments
 from benchmarks.review.review import review
-from benchmarks.runner.definition import RunSource, load_suite
+from benchmarks.runner.definition import load_suite
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
 from fusion.cli import main
-from logs import importing
+from logs.reader import read_run
+from logs.writer import RunWriter
+from sensors.simulate import simulate
 
 SUITE = """
 [suite]
@@ -63,12 +69,13 @@ def material(place):
 
 
 def test_page_holds_verdicts_tables_figures_and_provenance(material):
-    page = report(material, "fusion bench run suite.toml")
+    page = report(material)
     assert page.count("data:image/png;base64,") == len(FIGURES) - (not material.timing)
     for part in ("Leaderboard", "Pairs on pos_p75", "Faults", "Worst moments", "Lost cells", "Runs", "Estimators"):
         assert f"**{part}" in page
     assert "wheels" in page.splitlines()[2]
-    assert "fusion bench run suite.toml" in page
+    assert f"fusion bench run {shlex.join(material.words)}" in page
+    assert "2 runs, 2 estimators, 1 fault, 1 seed: 8 cells" in page
 
 
 def test_cost_is_drawn_once_it_was_measured(place, capsys):
@@ -80,13 +87,13 @@ def test_cost_is_drawn_once_it_was_measured(place, capsys):
     suite, store = load_suite(place / "suite.toml"), Store(place / "store")
     timed = Material(suite, read_results(cells_of(suite, store), store), store)
     assert timed.timing.keys() == {"wheels", "radio"}
-    assert report(timed, "").count("data:image/png;base64,") == len(FIGURES)
+    assert report(timed).count("data:image/png;base64,") == len(FIGURES)
 
 
 def test_distance_from_the_limit_is_told_where_it_is_asked_for(material):
-    assert "Times the physical limit" not in report(material, "")
-    page = report(material, "", limit=True)
-    (row,) = re.findall(r"\| wheels \| ([\d.]+)× \| ([\d.]+)× \|", page)
+    assert "Times the physical limit" not in report(material)
+    page = report(material, limit=True)
+    (row,) = re.findall(r"\| wheels \| \[([\d.]+)×\]\(#cell-\d+\) \| \[([\d.]+)×\]\(#cell-\d+\) \|", page)
     assert all(float(ratio) > 0.0 for ratio in row)
     assert "One perfect fix" in page
 
@@ -104,14 +111,14 @@ def test_efficiency_of_fixes_is_that_of_the_bound_at_the_true_places(material):
 
 def test_credibility_is_told_where_seeds_can_tell_it(material, tmp_path):
     """Every second reading drawn anew for each seed makes radio fixes err anew; wheels do not hear of it."""
-    assert "Credibility" not in report(material, "")
+    assert "Credibility" not in report(material)
     assert credibility(material).rows == (("wheels", "–"), ("radio", "–"))
     text = SUITE.replace('name = "page"', 'name = "page"\nseeds = 6').replace('"wifi" }', '"wifi", p = 0.5 }')
     (tmp_path / "seeds.toml").write_text(text.replace('use = "radio_only"', 'use = "ekf"'), encoding="utf-8")
     suite, store = load_suite(tmp_path / "seeds.toml"), Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
     seeded = Material(suite, read_results(cells_of(suite, store), store), store)
-    assert "Credibility" in report(seeded, "")
+    assert "Credibility" in report(seeded)
     rows = {row[0]: row[1:] for row in credibility(seeded).rows}
     assert rows["wheels"] == ("–",)
     nci, incl = map(float, re.fullmatch(r"([\d.]+) \(([+-][\d.]+)\)", rows["radio"][0]).groups())
@@ -119,54 +126,43 @@ def test_credibility_is_told_where_seeds_can_tell_it(material, tmp_path):
 
 
 def test_what_one_run_says_of_itself_is_told_only_where_it_is_the_only_one(material, tmp_path):
-    assert "within this run" not in report(material, "")
+    assert "within this run" not in report(material)
     office, _, rest = SUITE.partition('[[runs]]\nid = "mec"')
     (tmp_path / "one.toml").write_text(office + rest[rest.index("[[estimators]]") :], encoding="utf-8")
     suite, store = load_suite(tmp_path / "one.toml"), Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
-    page = report(Material(suite, read_results(cells_of(suite, store), store), store), "")
+    page = report(Material(suite, read_results(cells_of(suite, store), store), store))
     assert len(re.findall(r"- within this run, wheels beats radio by .*; says nothing of other runs", page)) == 1
     assert "cannot tell wheels from radio" in page
 
 
 def test_radio_without_radio_is_lost_and_said_to_be(material):
-    page = report(material, "")
+    page = report(material)
     assert re.search(r"\| radio \|.*∞", page)
     assert "office radio silence 0" in page
 
 
 def test_worst_moments_are_the_largest_errors(material):
-    moments = worst_moments(material)
-    assert [moment.error_m for moment in moments] == sorted((moment.error_m for moment in moments), reverse=True)
-    for moment in moments:
-        error_m = material.series[moment.run.id, moment.contestant.id].error_m
-        assert moment.error_m == error_m[np.isfinite(error_m)].max()
+    found = worst_moments(material.results)
+    largest = [result.metrics["pos_max"] for result in found]
+    assert largest == sorted(largest, reverse=True)
+    for result in found:
+        series = material.series[result.cell.run.id, result.cell.contestant.id]
+        at = np.argmax(np.where(np.isfinite(series.error_m), series.error_m, -1.0))
+        assert result.metrics["pos_max"] == pytest.approx(series.error_m[at], rel=1e-12)
+        assert result.worst_at_s == pytest.approx(series.time_s[at], abs=0.11)  # the first instant is not the start
 
 
-def test_command_of_a_worst_moment_finds_that_moment(material, tmp_path, monkeypatch):
+def test_command_of_a_cell_makes_that_cell_again_and_finds_its_worst_moment(material, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    moment = worst_moments(material)[0]
-    made, shown = (shlex.split(part)[1:] for part in moment.command(material.suite.folder).split(" && "))
+    (result,) = (one for one in material.results if str(one.cell) == "office wheels silence 0")
+    made, shown = (shlex.split(part)[1:] for part in command(result, material.words).split(" && "))
     assert main(made) == 0
-    found = review(Path(shown[1]), estimators=[moment.contestant.use], worst=5).moments
-    assert (moment.at_s, moment.error_m) in [pytest.approx((one.at_s, one.error_m), abs=1e-6) for one in found]
-    assert float(shown[shown.index("--at") + 1]) == pytest.approx(moment.at_s, abs=0.006)
-
-
-def test_logs_are_named_from_where_the_suite_is_named_and_bags_are_imported_first(tmp_path):
-    log = tmp_path / "run.mcap"
-    log.touch()
-    assert as_log(RunSource("mine", mcap="run.mcap"), tmp_path) == ([], log)
-    bag = RunSource("bag", mcap="run.mcap", world="w.toml", topics={"odom": "/odom"}, truth_to_map=(1.0, 2.0, 0.5))
-    words, made = as_log(bag, tmp_path)
-    assert made == Path("bag.mcap")
-    parser = argparse.ArgumentParser()
-    importing.configure(parser)
-    arguments = parser.parse_args(words[2:])
-    assert (arguments.kind, arguments.folder) == ("rosbag", log)
-    assert (arguments.world, arguments.output) == (tmp_path / "w.toml", made)
-    assert arguments.topic == ["odom=/odom"]
-    assert arguments.truth_to_map == [1.0, 2.0, 0.5]
+    assert "the same to the bit as in the store" in capsys.readouterr().err
+    found = review(Path(shown[1]), estimators=[shown[shown.index("--estimators") + 1]], worst=5).moments
+    worst = result.worst_at_s, result.metrics["pos_max"]
+    assert worst in [pytest.approx((one.at_s, one.error_m), abs=1e-6) for one in found]
+    assert float(shown[shown.index("--at") + 1]) == pytest.approx(result.worst_at_s, abs=0.006)
 
 
 def test_contestants_are_ordered_by_the_median_of_what_is_compared(material):
@@ -179,25 +175,187 @@ def test_command_writes_one_file_that_needs_no_network(place, tmp_path, capsys):
     words = ["bench", "report", str(place / "suite.toml"), "--store", str(place / "store"), "--html", str(target)]
     assert main(words) == 0
     assert capsys.readouterr().out == f"{target}\n"
-    html = target.read_text(encoding="utf-8")
-    assert not re.search(r'(src|href)="(?!data:)', html)
-    assert '<meta name="viewport"' in html
+    page = target.read_text(encoding="utf-8")
+    assert not re.search(r'(src|href)="(?!data:|#)', page)
+    # Every number leads somewhere, and every cell is there.
+    assert set(re.findall(r'href="#([^"]+)"', page)) <= set(re.findall(r'id="([^"]+)"', page))
+    assert len(re.findall(r'<li id="cell-\d+">', page)) == 8
+    assert '<meta name="viewport"' in page
 
 
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium to look at the page with")
+def rows_of(page, title):
+    """The rows of the table under a title, as lists of cells."""
+    table = page.partition(f"**{title}")[2].split("\n\n")[1].splitlines()[2:]
+    return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in table]
+
+
+def entry_of(page, number):
+    """The entry of a cell that a number leads to."""
+    anchor = re.fullmatch(r"\[.*\]\(#(cell-\d+)\)", number).group(1)
+    return re.search(rf'<li id="{anchor}">(.*)</li>', page).group(1)
+
+
+def test_numbers_lead_to_the_cells_they_come_from(material):
+    page = report(material)
+    for run_id, *numbers in rows_of(page, "Run by run"):
+        for name, number in zip(material.contestants, numbers, strict=True):
+            entry = entry_of(page, number)
+            assert entry.startswith(f"{run_id}: ")
+            assert f" {run_id} {name} -o " in entry
+            assert f"pos_p75 {re.match(r'.(.*?)]', number).group(1)} cm" in entry
+    for name, number in rows_of(page, "Faults"):
+        assert f" {name} --fault silence " in entry_of(page, number)
+    for row in rows_of(page, "Leaderboard"):
+        p75 = entry_of(page, row[9])
+        assert f"pos_p75 {re.match(r'.(.*?)]', row[9]).group(1)} cm" in p75 or len(material.scored_runs) % 2 == 0
+        worst = entry_of(page, row[4])
+        assert f"pos_p75 {re.match(r'.(.*?)]', row[4]).group(1)} cm" in worst
+    (told,) = re.findall(r"^- .*\(\[where\]\(#(cell-\d+)\)\)$", page, re.MULTILINE)
+    assert " radio -o " in entry_of(page, f"[x](#{told})")
+
+
+CHROMIUM = pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium to look at the page with")
+CLICKED = """
+<script>
+addEventListener("load", () => {
+  document.querySelector('td a[href="#cell-0"], td a[href="#cell-1"]').click();
+  setTimeout(() => {
+    const entry = document.getElementById(location.hash.slice(1));
+    const button = entry.querySelector("button");
+    button.click();
+    const copied = `${button.textContent} ${getSelection()}`;
+    document.body.dataset.found = [entry.matches(":target"), entry.closest("details").open, copied].join(";");
+  }, 200);
+});
+</script>
+"""
+
+
+@CHROMIUM
+def test_click_on_a_number_opens_its_cell_and_its_command_can_be_copied(material, tmp_path):
+    page = tmp_path / "page.html"
+    page.write_bytes(as_html("page", report(material), SCRIPT).replace(b"</body>", CLICKED.encode() + b"</body>"))
+    done = chromium(tmp_path, "--virtual-time-budget=5000", "--dump-dom", page.as_uri())
+    shown = html.unescape(re.search(r'data-found="([^"]*)"', done.stdout).group(1))
+    assert re.fullmatch(r"true;true;(copied|press Ctrl-C) fusion bench replay .* --at [0-9.]+", shown)
+    assert "CONSOLE" not in done.stderr
+
+
+def chromium(folder, *words):
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr"]
+    command = ["chromium", *options, f"--user-data-dir={folder}/profile", *words]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+
+
+@CHROMIUM
 def test_browser_draws_the_page_without_console_errors(place, tmp_path):
     target, picture = tmp_path / "page.html", tmp_path / "page.png"
     assert (
         main(["bench", "report", str(place / "suite.toml"), "--store", str(place / "store"), "--html", str(target)])
         == 0
     )
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--window-size=420,2000"]
-    done = subprocess.run(
-        ["chromium", *options, f"--user-data-dir={tmp_path}/profile", f"--screenshot={picture}", target.as_uri()],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
+    done = chromium(tmp_path, "--window-size=420,2000", f"--screenshot={picture}", target.as_uri())
     assert "CONSOLE" not in done.stderr
     assert picture.stat().st_size > 20_000
+
+
+GRID = """
+[suite]
+name = "grid"
+[[runs]]
+id = "office"
+scenario = "office"
+duration_s = 10.0
+split = "tune"
+[[runs]]
+id = "mec"
+scenario = "mec"
+duration_s = 10.0
+[[runs]]
+id = "arena"
+scenario = "arena"
+duration_s = 10.0
+[[estimators]]
+id = "radio"
+use = "radio_only"
+grid = { window_s = [1.0, 2.5] }
+"""
+
+
+def grid_of(folder, text):
+    (folder / "grid.toml").write_text(text, encoding="utf-8")
+    suite, store = load_suite(folder / "grid.toml"), Store(folder / "store")
+    run_suite(suite, store, workers=1)
+    return Material(suite, read_results(cells_of(suite, store), store), store)
+
+
+def test_parameters_of_a_grid_are_compared_with_the_default_tune_runs_apart(material, tmp_path):
+    assert "**Parameters" not in report(material)
+    grid = grid_of(tmp_path, GRID)
+    page = report(grid)
+    first, second = rows_of(page, "Parameters")
+    assert second == ["radio", "window_s", "2.5 (default)", "–", "–"]
+    p75 = {(one.cell.run.id, one.cell.contestant.id): one.metrics["pos_p75"] for one in grid.results}
+    ratio = {
+        run: p75[run, "radio[window_s=1.0]"] / p75[run, "radio[window_s=2.5]"] for run in ("office", "mec", "arena")
+    }
+    assert first[3].startswith(f"[{ratio['office']:.2f}×](")
+    assert first[4].startswith(f"[{math.sqrt(ratio['mec'] * ratio['arena']):.2f}× [")
+    assert "radio: on the tune runs window_s = " in page
+    assert [row[0] for row in rows_of(page, "Run by run")] == ["mec", "arena"]
+    assert "office (tune)" in page
+    assert WITHOUT_TUNE not in page
+
+
+def test_grid_without_tune_runs_is_said_to_flatter(tmp_path):
+    assert WITHOUT_TUNE in report(grid_of(tmp_path, GRID.replace('split = "tune"', "")))
+
+
+def test_suite_of_nothing_but_tune_runs_says_so(tmp_path):
+    _, head, rest = GRID.partition("[[estimators]]")
+    runs = GRID[: GRID.index('[[runs]]\nid = "mec"')]
+    assert "**All runs are for tuning**" in report(grid_of(tmp_path, runs + head + rest))
+
+
+LOST = """
+[suite]
+name = "lost"
+[[runs]]
+id = "office"
+scenario = "office"
+duration_s = 6.0
+[[estimators]]
+id = "broken"
+use = "ekf"
+params = { gate_probability = 7.0 }
+"""
+
+
+def test_estimator_that_crashed_everywhere_leaves_a_page_that_says_why_and_draws_nothing(tmp_path):
+    page = report(grid_of(tmp_path, LOST))
+    ((cell, status, why),) = rows_of(page, "Lost cells")
+    assert (status, cell) == ("crashed", "[office broken clean 0](#cell-0)")
+    assert why.startswith("`")
+    assert "gate_probability" in why
+    assert "data:image" not in page
+    assert "1 run, 1 estimator, no faults, 1 seed: 1 cell." in page
+
+
+def test_runs_without_truth_rank_nobody_and_are_named(tmp_path):
+    seen = read_run(simulate("office", tmp_path / "seen.mcap", duration_s=10.0))
+    with RunWriter(tmp_path / "blind.mcap", seen.world, name="blind", prior=seen.prior) as log:
+        for measurement in seen.measurements:
+            log.write(measurement)
+    blind = '[[runs]]\nid = "blind"\nmcap = "blind.mcap"\n'
+    estimators = "".join(
+        f'[[estimators]]\nid = "{name}"\nuse = "{name}"\n' for name in ("dead_reckoning", "radio_only")
+    )
+    alone = report(grid_of(tmp_path, f'[suite]\nname = "blind"\n{blind}{estimators}'))
+    assert "Nothing can be compared" in alone
+    assert "∞" not in alone
+    assert "data:image" not in alone
+    beside = f'[suite]\nname = "both"\n{blind}[[runs]]\nid = "seen"\nmcap = "seen.mcap"\n{estimators}'
+    page = report(grid_of(tmp_path, beside))
+    assert "Without ground truth, and so without an error: blind." in page
+    assert [row[0] for row in rows_of(page, "Run by run")] == ["seen"]
+    assert all(row[2].startswith("[1/1]") for row in rows_of(page, "Leaderboard"))

@@ -4,13 +4,15 @@ import csv
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from benchmarks.runner.compare_verb import stored_results
-from benchmarks.runner.definition import Contestant, Gate, RunSource, load_suite
+from benchmarks.runner.definition import Contestant, FaultSet, Gate, RunSource, load_suite
+from benchmarks.runner.export_verb import as_junit, as_latex
 from benchmarks.runner.gate_verb import Outcome, judge, read_baseline
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import comparison, flat, score_matrix
@@ -18,6 +20,7 @@ from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
 from benchmarks.runner.time_verb import peak_mb
 from benchmarks.runner.verify_verb import differing
+from benchmarks.sheet import Sheet
 from fusion.cli import main
 
 HEAD = '[suite]\nname = "verbs"\n'
@@ -213,3 +216,11 @@ def test_peak_memory_is_that_of_the_estimator_in_a_process_of_its_own():
     )
     assert 10.0 < few < held.nbytes / 2**20
     assert many > few + 3 * 2.4e6 / 2**20
+
+
+def test_what_an_estimator_says_breaks_no_export():
+    cell = SimpleNamespace(run=RunSource("a"), fault=FaultSet("clean"), contestant=Contestant("b", "b"), seed=0)
+    lost = SimpleNamespace(cell=cell, status="crashed", error="red \x1b[31m & <b>\x00")
+    failure = ElementTree.fromstring(as_junit(SimpleNamespace(name="s"), [lost])).find("testcase/failure")
+    assert failure.text == "red ?[31m & <b>?"
+    assert rb"a\{b\}\_1 & \textbackslash{}" in as_latex(Sheet("sizes", ("a{b}_1", "\\"), ()))

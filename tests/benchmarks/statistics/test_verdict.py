@@ -99,7 +99,7 @@ def test_one_run_is_not_enough():
     assert verdict.winner is None
     assert verdict.ratio[1:] == (0.0, math.inf)
     assert (verdict.detectable, verdict.runs_needed) == (1.0, None)
-    assert "1 of 1 runs can be compared" in verdict.sentence
+    assert "1 of 1 run can be compared" in verdict.sentence
 
 
 def test_estimator_ties_with_its_own_copy():

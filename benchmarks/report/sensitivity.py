@@ -1,0 +1,177 @@
+"""How much the parameters matter that a suite has a grid of: each value against the default, run by run.
+
+A value that is chosen on a run and scored on it flatters itself, so the runs for tuning and those for testing stand
+apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+import fusion
+from benchmarks.metrics.score import quantile
+from benchmarks.metrics.track import Flags, Floats
+from benchmarks.plotting import label, panels, plain_colour, plain_ticks
+from benchmarks.report.cells import link, nearest
+from benchmarks.report.material import Material
+from benchmarks.runner.definition import CLEAN, TEST, TUNE, Contestant
+from benchmarks.runner.results import Result, by_run, score_matrix
+from benchmarks.sheet import Sheet
+from benchmarks.statistics.statistics import log_ratios, mean_interval
+from fusion.plugins import parameters
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WITHOUT_TUNE = (
+    'No run of this suite has split = "tune". Whoever takes the best value from here has chosen it on the runs that it '
+    "is scored on: it will do worse on others."
+)
+
+
+class Sweep(NamedTuple):
+    """One parameter of a grid. ``cells``: of every value those of every run, seeds and the grid's other parameters
+    among them; ``scores`` (values, runs): their medians. ``compared_with``: the place of the default, or of the first
+    value where the default is not in the grid.
+    """
+
+    estimator: str
+    use: str
+    parameter: str
+    values: Sequence[object]
+    compared_with: int
+    has_default: bool
+    cells: Sequence[Sequence[Sequence[Result]]]
+    scores: Floats
+    is_test: Flags
+
+    @property
+    def log_ratios(self) -> Floats:
+        """(values, runs): below 0 where a value is better than what it is compared with."""
+        return np.array([log_ratios(row, self.scores[self.compared_with]) for row in self.scores])
+
+    def name(self, place: int) -> str:
+        """A value, and whether it is the default."""
+        return f"{self.values[place]}{' (default)' if self.has_default and place == self.compared_with else ''}"
+
+
+def sweeps(material: Material) -> list[Sweep]:
+    """Every parameter that has several values; empty for a suite without a grid."""
+    families: dict[tuple[str, str], list[Contestant]] = {}
+    for one in material.suite.contestants:
+        if one.grid:
+            families.setdefault((one.id.partition("[")[0], one.use), []).append(one)
+    return [
+        _sweep(material, estimator, own, parameter, values)
+        for (estimator, _), own in families.items()
+        for parameter, values in own[0].grid.items()
+        if len(values) > 1
+    ]
+
+
+def _sweep(
+    material: Material, estimator: str, own: Sequence[Contestant], parameter: str, values: Sequence[object]
+) -> Sweep:
+    cells = [_cells(material, [one.id for one in own if one.params[parameter] == value]) for value in values]
+    scores = [[quantile(score_matrix(few, material.metric).ravel(), 0.5) for few in row] for row in cells]
+    default = parameters(fusion.load(own[0].use))[parameter].default
+    known = [place for place, value in enumerate(values) if value == default]
+    is_test = np.array([few[0].cell.run.split == TEST for few in cells[0]])
+    place, has_default = (known or [0])[0], bool(known)
+    return Sweep(estimator, own[0].use, parameter, values, place, has_default, cells, np.array(scores), is_test)
+
+
+def _cells(material: Material, ids: Sequence[str]) -> list[list[Result]]:
+    """Run by run the cells without faults of these contestants."""
+    own = [one for one in material.results if one.cell.fault.id == CLEAN and one.cell.contestant.id in ids]
+    return list(by_run(own).values())
+
+
+def sensitivity(material: Material, found: Sequence[Sweep]) -> Sheet:
+    """Each value as a multiple of what it is compared with: geometric mean over runs with its paired t interval. It
+    leads to the run in which the value makes the greatest difference.
+    """
+    rows = [
+        (
+            sweep.estimator,
+            sweep.parameter,
+            sweep.name(place),
+            *(_linked(material, sweep, place, of) for of in (~sweep.is_test, sweep.is_test)),
+        )
+        for sweep in found
+        for place in range(len(sweep.values))
+    ]
+    title = f"Parameters: {material.metric} as a multiple of the default's (else of the first value's), [95 %]"
+    return Sheet(title, ("estimator", "parameter", "value", "tune runs", "test runs"), tuple(rows))
+
+
+def _linked(material: Material, sweep: Sweep, place: int, of: Flags) -> str:
+    text = _told(sweep, place, of)
+    if text == "–":
+        return text
+    run = int(np.where(of, np.abs(sweep.log_ratios[place]), -1.0).argmax())
+    return link(material, text, nearest(sweep.cells[place][run], material.metric, sweep.scores[place, run]))
+
+
+def _told(sweep: Sweep, place: int, of: Flags) -> str:
+    ratios = sweep.log_ratios[place, of]
+    known = ratios[np.isfinite(ratios)]
+    if place == sweep.compared_with or len(known) == 0:
+        return "–"
+    mean, low, high = (math.exp(min(float(value), 50.0)) for value in mean_interval(known)[:3])
+    interval = f" [{low:.2f}, {high:.2f}]" if len(known) > 1 else ""
+    gone = f" ({len(ratios) - len(known)} lost)" if len(known) < len(ratios) else ""
+    return f"{mean:.2f}×{interval}{gone}"
+
+
+def advice(found: Sequence[Sweep]) -> Iterator[str]:
+    """What may be concluded: the best value of the tune runs, and what it is worth on the others."""
+    for sweep in found:
+        if sweep.is_test.all():
+            yield WITHOUT_TUNE
+            return
+        best = int(np.argmin([quantile(row, 0.5) for row in sweep.log_ratios[:, ~sweep.is_test]]))
+        chosen = f"{sweep.estimator}: on the {TUNE} runs {sweep.parameter} = {sweep.name(best)} is best"
+        if best == sweep.compared_with:
+            yield f"{chosen}."
+        else:
+            worth = _told(sweep, best, sweep.is_test)
+            yield f"{chosen}; on the {TEST} runs it scores {worth} what {sweep.name(sweep.compared_with)} does."
+
+
+def curves(material: Material, found: Sequence[Sweep]) -> Figure:
+    """One panel per parameter."""
+    drawn, every = panels(len(found), 3.6, columns=3)
+    for axes, sweep in zip(every, found, strict=True):
+        _draw(axes, sweep)
+        label(
+            axes, f"{sweep.estimator}: {sweep.parameter}", "value; dotted: the default", f"ratio of {material.metric}"
+        )
+    return drawn
+
+
+def _draw(axes: Axes, sweep: Sweep) -> None:
+    """A grey line per run, dashed where it is for tuning; the mean of the test runs with its interval."""
+    places = np.arange(len(sweep.values))
+    ratios = np.exp(np.where(np.isfinite(sweep.log_ratios), sweep.log_ratios, np.nan))
+    for run, is_test in enumerate(sweep.is_test.tolist()):
+        axes.plot(places, ratios[:, run], color="0.7", linewidth=1, linestyle="-" if is_test else "--", zorder=1)
+    judged = sweep.is_test if sweep.is_test.any() else ~sweep.is_test
+    found = [mean_interval(row[np.isfinite(row)]) for row in sweep.log_ratios[:, judged]]
+    mean, low, high = (np.exp(np.clip([float(one[k]) for one in found], -50.0, 50.0)) for k in range(3))
+    colour = plain_colour(sweep.use)
+    if judged.sum() > 1:
+        axes.vlines(places, low, high, color=colour, linewidth=2, zorder=2)
+    axes.plot(places, mean, color=colour, marker="o", linewidth=2, zorder=3)
+    if sweep.has_default:
+        axes.axvline(sweep.compared_with, color="0.4", linestyle=":", linewidth=1, zorder=0)
+    axes.set_yscale("log")
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(min(bottom, 0.8), max(top, 1.25))
+    plain_ticks(axes.yaxis, (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 7.0, 8.0, 9.0))
+    axes.set_xticks(places, [str(value) for value in sweep.values])
