@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import fusion
-from benchmarks.metrics.track import FateColumns, Track
+from benchmarks.metrics.fates import FateColumns
+from benchmarks.metrics.track import Track
 from benchmarks.prior import starting_prior
 from fusion import FusionError, Update
 from logs.run import Run

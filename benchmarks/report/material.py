@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.metrics.archive import from_bytes
 from benchmarks.metrics.instants import Answers, Instants, evaluation_instants, match
-from benchmarks.metrics.track import Floats, from_bytes
+from benchmarks.metrics.track import Floats
 from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.results import RANKED_BY, Result, by_contestant, comparison, median_metrics
 from benchmarks.runner.source import open_run

@@ -80,17 +80,19 @@ def _draw_circles(canvas: Canvas, place: Place, world: World, readings: Heard, d
     when the estimator believed it wholly, vermillion when not at all.
     """
     fates, rr = drawing.fates, canvas.rr
-    asked = ~fates.of(Reason.KIND_NOT_CONSUMED)
-    radius_m = np.array([readings.radius_of.get(fate[:4], np.nan) for fate in fates.fates], dtype=np.float64)
+    asked = ~fates.met(Reason.KIND_NOT_CONSUMED)
+    told = (fate for update in drawing.lane.final for fate in update.fates)
+    radius_m = np.array([readings.radius_of.get(fate[:4], np.nan) for fate in told], dtype=np.float64)
     drawn = asked & np.isfinite(radius_m)
     if not drawn.any():
         return
     # An update none of whose readings makes a circle still takes away those of the one before.
-    updates, first = np.unique(fates.update[asked], return_index=True)
-    lengths = np.bincount(np.searchsorted(updates, fates.update[drawn]), minlength=len(updates))
+    updates, first = np.unique(drawing.fate_update[asked], return_index=True)
+    lengths = np.bincount(np.searchsorted(updates, drawing.fate_update[drawn]), minlength=len(updates))
     position = {anchor.id: (anchor.x, anchor.y) for anchor in world.anchors}
+    centers = np.array([position.get(name, (np.nan, np.nan)) for name in fates.names.tolist()])
     circles = {
-        "centers": np.array([position[name] for name in fates.name[drawn].tolist()]),
+        "centers": centers[fates.anchor[drawn]],
         "half_sizes": np.repeat(radius_m[drawn, None], 2, axis=1),
         "colors": weight_colours(fates.weight[drawn]),
     }

@@ -93,9 +93,9 @@ def corners(time_ns: Stamps, values: Floats) -> tuple[Stamps, Floats]:
 def _draw_gating(canvas: Canvas, world: World, frame: Frame, drawing: Drawing) -> None:
     """Weight and NIS of every reading, one series per anchor; a reading without anchor goes by its sensor."""
     fates, name = drawing.fates, drawing.name
-    heard = ~fates.of(Reason.KIND_NOT_CONSUMED)
-    for anchor in np.unique(fates.name[heard]).tolist():
-        own = heard & (fates.name == anchor)
+    heard, source = ~fates.met(Reason.KIND_NOT_CONSUMED), fates.source
+    for code in np.unique(source[heard]).tolist():
+        own, anchor = heard & (source == code), str(fates.names[code])
         colour = anchor_colour(world, anchor)
         canvas.dots(["weight", name, anchor], anchor, colour, fates.time_ns[own], fates.weight[own])
         canvas.dots(["nis", name, anchor], anchor, colour, fates.time_ns[own], fates.nis[own])
