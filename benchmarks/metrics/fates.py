@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.metrics.track import Flags, Floats, Stamps, Whole
-from fusion import Decision, Gyro, MotorCommand, Odometry, Ranges, Reason, Update, WheelTicks, WifiScan
+from fusion import Decision, Fate, Gyro, MotorCommand, Odometry, Ranges, Reason, Update, WheelTicks, WifiScan
 
 Codes = NDArray[np.int16]
 
@@ -49,8 +49,8 @@ class FateColumns(NamedTuple):
     def of(cls, updates: Sequence[Update]) -> FateColumns:
         """The columns of the fates of updates in time order."""
         lengths = fates_per_update(updates)
-        fates = list(chain.from_iterable(update.fates for update in updates))
-        kinds = np.fromiter((KIND_CODE[type(update.measurement)] for update in updates), np.int16, len(updates))
+        fates = fates_of(updates)
+        kinds = np.fromiter(map(KIND_CODE.__getitem__, map(type, field(updates, 0))), np.int16, len(updates))
         names = sorted({*field(fates, 1), *field(fates, 3)})
         code_of = {name: code for code, name in enumerate(names)}
         sensor, anchor = (np.fromiter(map(code_of.__getitem__, field(fates, i)), np.int16, len(fates)) for i in (1, 3))
@@ -84,6 +84,11 @@ class FateColumns(NamedTuple):
         return float(known.mean()) if len(known) and np.isfinite(known).all() else None
 
 
+def fates_of(updates: Sequence[Update]) -> list[Fate]:
+    """The fates behind the rows of `FateColumns`."""
+    return list(chain.from_iterable(field(updates, 2)))
+
+
 def fates_per_update(updates: Sequence[Update]) -> Whole:
     """How many rows of their `FateColumns` each of ``updates`` has, (n,)."""
-    return np.fromiter((len(update.fates) for update in updates), np.int64, len(updates))
+    return np.fromiter(map(len, field(updates, 2)), np.int64, len(updates))

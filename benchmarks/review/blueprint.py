@@ -92,6 +92,9 @@ def _details(frame: Frame, drawn: Sequence[Drawing]) -> list[Any]:
             nees = f"{name}: NEES; 95 % should lie between the lines"
             views += [tabs([plot(frame, title, origin, legend=False) for title, origin in axes])]
             views += [plot(frame, nees, rr.new_entity_path(["nees", name]), top=_nees_top(drawing), legend=False)]
+        if drawing.lane.clouds is not None:
+            effective = f"{name}: effective number of particles"
+            views += [plot(frame, effective, rr.new_entity_path(["neff", name]), legend=False)]
         views += [event_view(name)] if drawing.events.text else []
         if views:
             details.append(rrb.Vertical(*views, name=name))

@@ -39,6 +39,7 @@ def draw_over_time(canvas: Canvas, world: World, frame: Frame, drawing: Drawing)
     if not drawing.ghost:
         _draw_consistency(canvas, drawing)
         _draw_nees(canvas, drawing)
+        _draw_effective_number(canvas, drawing)
         _draw_gating(canvas, world, frame, drawing)
         _draw_states(canvas, drawing)
         _draw_events(canvas, drawing)
@@ -81,6 +82,13 @@ def _draw_nees(canvas: Canvas, drawing: Drawing) -> None:
     for number, end in enumerate(("lower", "upper")):
         bound = np.where(errors.dimension == 3, NEES_BOUNDS[3][number], NEES_BOUNDS[2][number])
         canvas.line([*place, end], f"95 % {end}", TRUTH, *corners(time_ns, bound), width=1.0, merge="Off")
+
+
+def _draw_effective_number(canvas: Canvas, drawing: Drawing) -> None:
+    clouds = drawing.lane.clouds
+    if clouds is not None:
+        look = (["neff", drawing.name], "effective particles", drawing.colour)
+        canvas.line(*look, clouds.time_ns, clouds.effective_number)
 
 
 def corners(time_ns: Stamps, values: Floats) -> tuple[Stamps, Floats]:

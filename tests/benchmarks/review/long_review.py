@@ -12,6 +12,7 @@ import numpy as np
 
 import fusion
 from benchmarks.cell import Cell, score_lane
+from benchmarks.clouds import CloudWatch
 from benchmarks.lane import Lane
 from benchmarks.review.scene import write_scene
 from fusion import (
@@ -20,6 +21,7 @@ from fusion import (
     Estimate,
     Fate,
     Odometry,
+    Particles,
     Pose,
     RangeReading,
     Ranges,
@@ -52,6 +54,27 @@ def long_run(poses: int) -> Run:
     return Run(Path("long.mcap"), "long", WORLD, None, {}, tuple(measurements), TruthTrack.from_truths(truths), (), {})
 
 
+class MadeUpTracker:
+    """Shows a new cloud of a thousand particles whenever it is asked."""
+
+    def __init__(self) -> None:
+        self.time_ns = 0
+        self._random = np.random.default_rng(1)
+
+    def particles(self) -> Particles:
+        weights = self._random.exponential(size=1000)
+        return Particles(self._random.normal(10.0, 2.0, (1000, 2)), weights / weights.sum())
+
+
+def watched(run: Run) -> CloudWatch:
+    """The clouds of an estimator that has particles."""
+    watch, tracker = CloudWatch(run), MadeUpTracker()
+    for measurement in run.measurements:
+        tracker.time_ns = measurement.time_ns
+        watch(tracker, measurement)
+    return watch
+
+
 def made_up_lane(run: Run, number: int) -> Lane:
     """Half a metre beside the truth; every twentieth reading is rejected."""
     covariance, updates = Covariance(0.25, 0.05, 0.0, 0.25, 0.0, 0.01), []
@@ -68,7 +91,7 @@ def made_up_lane(run: Run, number: int) -> Lane:
                 Fate(*head, r.anchor, *what, 0.1, 0.04, nis) for r, what in zip(measurement.readings, told, strict=True)
             )
         updates.append(Update(measurement, Estimate(measurement.time_ns, pose, covariance), fates))
-    return Lane(f"estimator {number}", tuple(updates), "", 0.0, None)
+    return Lane(f"estimator {number}", tuple(updates), "", 0.0, None, clouds=watched(run).clouds())
 
 
 def cost_s(poses: int, estimators: int, output: Path) -> float:
