@@ -140,6 +140,19 @@ def test_review_holds_floor_truth_tracks_errors_weights_and_readings(tmp_path):
     assert expected <= chunks.keys()
 
 
+def test_run_in_unix_time_is_on_a_second_timeline_and_another_is_not(tmp_path):
+    since_start = run_of(tmp_path)
+    unix_ns = 1_627_997_452 * SECOND_NS
+    moved = [replace(scan, time_ns=scan.time_ns + unix_ns) for scan in since_start.measurements]
+    truth = replace(since_start.truth, time_ns=since_start.truth.time_ns + unix_ns)
+    run = replace(since_start, measurements=tuple(moved), truth=truth)
+    (scene,) = write_scene(tmp_path / "review.rrd", run, *scored(run, ["toy"]))
+    (batch,) = [batch for batch in chunks_of(scene)["/rssi/b"] if "t" in batch.schema.names]
+    assert batch.column("t")[0].as_py().total_seconds() == 0.0
+    assert batch.column("utc").to_numpy(zero_copy_only=False).astype(np.int64).tolist() == [m.time_ns for m in moved]
+    assert all("utc" not in b.schema.names for b in review_of(tmp_path, "toy")["/rssi/b"])
+
+
 def test_particles_and_their_effective_number_are_drawn_where_an_estimator_shows_them(tmp_path):
     run = run_of(tmp_path)
     watch = CloudWatch(run)
