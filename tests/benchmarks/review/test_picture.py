@@ -111,6 +111,14 @@ def test_viewer_that_ends_at_once_is_told_with_the_remedy(tmp_path, monkeypatch)
         render([scene], tmp_path / "review.png")
 
 
+def test_picture_that_cannot_be_written_is_told(tmp_path):
+    pytest.importorskip("rerun", reason="needs the extra `review`")
+    (tmp_path / "scene.rrd").write_bytes(b"")
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(ViewerError, match="cannot be written"):
+        render([tmp_path / "scene.rrd"], tmp_path / "file" / "review.png")
+
+
 def test_missing_scene_log_and_estimator_are_refused(log, tmp_path):
     pytest.importorskip("rerun", reason="needs the extra `review`")
     with pytest.raises(ViewerError, match="no such file"):
