@@ -15,7 +15,10 @@ def at_least_one(text: str) -> int:
 
 def since_start(text: str) -> float:
     """A time [s] after a run's start, from a command line."""
-    at_s = float(text)
+    try:
+        at_s = float(text)
+    except ValueError:
+        at_s = math.nan
     if not 0.0 <= at_s < math.inf:
         raise argparse.ArgumentTypeError(f"{text} is no time of a run; give seconds since its start")
     return at_s

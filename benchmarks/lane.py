@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import fusion
-from benchmarks.metrics.track import FateColumns, Track
+from benchmarks.clouds import Clouds
+from benchmarks.metrics.fates import FateColumns
+from benchmarks.metrics.track import Track
 from benchmarks.prior import starting_prior
-from fusion import FusionError, Update
+from fusion import FusionError, Measurement, Tracker, Update
 from logs.run import Run
+
+Watch: TypeAlias = Callable[[Tracker, Measurement], None]
+"""Called after every measurement; it may look, and must not touch."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +27,7 @@ class Lane:
     ``updates`` stand in the order of arrival, revisions among them; ``digest`` certifies them. ``cpu_s`` is the
     processor time of the fold alone. ``error`` is None, or why the estimator stopped: ``updates`` ends there then,
     ``digest`` is empty and ``cpu_s`` zero. ``ghost_of``: of which estimator this is a counterfactual, None: of none.
+    ``clouds``: its particles, where somebody watched them.
     """
 
     name: str
@@ -29,6 +36,7 @@ class Lane:
     cpu_s: float
     error: str | None
     ghost_of: str | None = None
+    clouds: Clouds | None = None
 
     @cached_property
     def final(self) -> tuple[Update, ...]:
@@ -46,14 +54,25 @@ class Lane:
         return FateColumns.of(self.final)
 
 
-def run_lane(run: Run, estimator: str, options: Mapping[str, object] | None = None, seed: int = 0) -> Lane:
+def run_lane(
+    run: Run,
+    estimator: str,
+    options: Mapping[str, object] | None = None,
+    seed: int = 0,
+    *,
+    watch: Watch | None = None,
+) -> Lane:
     """Fold the measurements of ``run`` through the estimator of that name. Never raises for what a plug-in does."""
     updates: list[Update] = []
     certificate, error, cpu_s = "", None, 0.0
     try:
         built, prior = fusion.build(estimator, run.world, options), starting_prior(run)
         started_s = time.process_time()
-        updates.extend(fusion.track(built, run.world, run.measurements, prior, seed=seed))
+        tracker = Tracker(built, run.world, prior, seed=seed)
+        for measurement in run.measurements:
+            updates.extend(tracker.push(measurement))
+            if watch is not None:
+                watch(tracker, measurement)
         cpu_s = time.process_time() - started_s
         # Reads every number there is, so an answer that is no number ends here and not in the scores.
         certificate = fusion.digest(updates)

@@ -13,7 +13,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from estimators.sampling import Array, judged, mixture, moments, total_variance
+from estimators.sampling import Array, carried, judged, mixture, moments, total_variance
 from fusion import (
     Covariance,
     Estimate,
@@ -22,6 +22,7 @@ from fusion import (
     Measurement,
     Odometry,
     ParameterError,
+    Particles,
     Pose,
     Prior,
     Ranges,
@@ -105,6 +106,12 @@ class BayesGrid:
         pose, covariance = compose(state.pose, state.covariance, state.motion)
         return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
 
+    def particles(self, state: State) -> Particles:
+        """The cells of every heading, carried by the motion not yet made."""
+        places = carried(self._x, self._y, self._heading, state.motion)
+        every = [np.broadcast_to(place, state.histogram.shape).ravel() for place in places]
+        return Particles(np.column_stack(every), state.histogram.ravel())
+
     def _state(self, time_ns: int, histogram: Array, motion: Increment) -> State:
         """A state of normalised probabilities; within its cell a pose is uniform, hence the twelfths."""
         histogram = histogram / histogram.sum()
@@ -132,8 +139,7 @@ class BayesGrid:
 
     def _likelihood(self, sighting: Sighting, motion: Increment) -> tuple[Array, Array]:
         """The mixture in every cell, moved by ``motion``; the reading's variance includes its spread within a cell."""
-        c, s = np.cos(self._heading), np.sin(self._heading)
-        x, y = self._x + c * motion.x - s * motion.y, self._y + s * motion.x + c * motion.y
+        x, y = carried(self._x, self._y, self._heading, motion)
         expected = sighting.expected_values(x, y, self._heading + motion.heading, self._world.robot.antenna_m)
         # One heading's floor shows the spread within a cell well enough for all.
         by_x, by_y = np.gradient(expected[0])

@@ -14,7 +14,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from estimators.sampling import Array, judged, mixture, moments, square_root, total_variance
+from estimators.sampling import Array, carried, judged, mixture, moments, square_root, total_variance
 from fusion import (
     Covariance,
     Estimate,
@@ -23,6 +23,7 @@ from fusion import (
     Measurement,
     Odometry,
     ParameterError,
+    Particles,
     Pose,
     Prior,
     Ranges,
@@ -111,6 +112,12 @@ class Particle:
         """Mean and covariance of the cloud, after the motion since the last reading."""
         pose, covariance = compose(state.pose, state.covariance, state.motion)
         return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
+
+    def particles(self, state: State) -> Particles:
+        """The cloud, carried by the motion since the last reading."""
+        return Particles(
+            np.column_stack(carried(state.cloud[X], state.cloud[Y], state.cloud[HEADING], state.motion)), state.weights
+        )
 
     def _update(self, state: State, scan: WifiScan | Ranges) -> tuple[State, tuple[Fate, ...]]:
         random = generator(state.seed, scan)

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fusion import Covariance, Decision, Fate, Pose, Ranges, Reason, Sighting, WifiScan, wrap_angle
+from fusion import Covariance, Decision, Fate, Increment, Pose, Ranges, Reason, Sighting, WifiScan, wrap_angle
 
 Array = NDArray[np.float64]
 
@@ -57,6 +57,12 @@ def moments(weights: Array, x: Array, y: Array, heading: Array) -> tuple[Pose, C
     pairs = ((dx, dx), (dx, dy), (dx, turn), (dy, dy), (dy, turn), (turn, turn))
     spread = Covariance(*(float(np.sum(weights * (one * other))) for one, other in pairs))
     return Pose(mean_x, mean_y, wrap_angle(mean_heading)), spread
+
+
+def carried(x: Array, y: Array, heading: Array, motion: Increment) -> tuple[Array, Array]:
+    """Where points at (x, y) with ``heading`` come to by ``motion``, each in its own direction."""
+    c, s = np.cos(heading), np.sin(heading)
+    return x + c * motion.x - s * motion.y, y + s * motion.x + c * motion.y
 
 
 def judged(

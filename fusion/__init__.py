@@ -40,7 +40,7 @@ from fusion.errors import (
     ViewerError,
     WorldError,
 )
-from fusion.estimator import Estimator, Tag, generator
+from fusion.estimator import Estimator, ParticleEstimator, Particles, Tag, generator
 from fusion.geometry import Covariance, Pose, wrap_angle
 from fusion.motion import Increment, compose
 from fusion.plugins import build, load, names, registered
@@ -102,6 +102,8 @@ __all__ = [
     "Odometry",
     "OdometryNoise",
     "ParameterError",
+    "ParticleEstimator",
+    "Particles",
     "PluginError",
     "Pose",
     "Prior",

@@ -11,7 +11,6 @@ from enum import Enum, unique
 from typing import Any, NamedTuple
 
 from fusion.errors import ConformanceError, ParameterError, did_you_mean
-from fusion.estimator import Tag
 from fusion.plugins import load
 from fusion.promises import PROMISES, Promise
 
@@ -53,7 +52,7 @@ class Verdict(NamedTuple):
 
 def checks(estimator: type[Any]) -> Iterator[Check]:
     """The checks that apply to ``estimator`` by its tags, in a fixed order."""
-    return (Check(promise, estimator) for promise in PROMISES if not promise.excuse(estimator.tags))
+    return (Check(promise, estimator) for promise in PROMISES if not promise.excuse(estimator))
 
 
 def run_checks(name: str, expected_failures: Mapping[str, str] | None = None) -> list[Verdict]:
@@ -73,8 +72,7 @@ def run_checks(name: str, expected_failures: Mapping[str, str] | None = None) ->
 
 def _verdict(check: Check, excuse: str | None) -> Verdict:
     promise = check.promise
-    tags: frozenset[Tag] = getattr(check.estimator, "tags", frozenset())
-    if skip := promise.excuse(tags):
+    if skip := promise.excuse(check.estimator):
         return Verdict(promise.id, promise.reason, Outcome.SKIPPED, skip)
     try:
         check.run()

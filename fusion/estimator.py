@@ -9,13 +9,15 @@ generator in an estimator; randomness comes from `generator`. `docs/plugin.md` b
 from __future__ import annotations
 
 from enum import Enum, unique
-from typing import ClassVar, Protocol, TypeVar, runtime_checkable
+from typing import ClassVar, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fusion.values import Estimate, Fate, Measurement, Prior
 
 State = TypeVar("State")
+State_contra = TypeVar("State_contra", contravariant=True)
 
 
 @unique
@@ -56,6 +58,28 @@ class Estimator(Protocol[State]):
 
     def estimate(self, state: State, time_ns: int) -> Estimate:
         """The belief at ``time_ns``, not before the state's own time. Later is never more certain."""
+
+
+class Particles(NamedTuple):
+    """A belief as weighted points: ``positions`` (n, 2) [m], map frame, and ``weights`` (n,), which sum to one."""
+
+    positions: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+    @property
+    def effective_number(self) -> float:
+        """How many of them count, 1 / Σ weight² (Kong, Liu & Wong 1994): from 1 to n."""
+        return 1.0 / float(self.weights @ self.weights)
+
+
+@runtime_checkable
+class ParticleEstimator(Protocol[State_contra]):
+    """What an estimator may offer beside the contract when its belief is made of points, so that they can be looked
+    at. Nothing depends on it.
+    """
+
+    def particles(self, state: State_contra) -> Particles:
+        """The points of ``state``, where they are at its own time."""
 
 
 def generator(seed: int, measurement: Measurement, purpose: int = 0) -> np.random.Generator:

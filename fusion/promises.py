@@ -18,7 +18,7 @@ import numpy as np
 from fusion.certificate import digest
 from fusion.drive import Drive, with_outlier, without
 from fusion.errors import ConformanceError
-from fusion.estimator import Estimator, Tag
+from fusion.estimator import Estimator, ParticleEstimator, Particles, Tag
 from fusion.geometry import Pose, wrap_angle
 from fusion.track import Tracker, Update, final, track
 from fusion.values import NANOSECONDS, Estimate, Measurement, Prior, Ranges, WifiScan, nanoseconds, seconds
@@ -33,6 +33,10 @@ NEAR_M = 0.5
 """Error [m] that no estimator of noiseless data may pass once it has settled."""
 NEAR_RAD = 0.3
 """The same for a heading [rad]."""
+NEAR_SHARE = 0.1
+"""How far the mean of particles may be from the estimate, as a share of their spread: the motion since the last reading
+may have moved each by itself, and the estimate as one.
+"""
 SETTLED_NS = nanoseconds(5.0)
 """Time in which an estimator settles."""
 NOISY = Drive(noisy=True, duration_s=12.0)
@@ -42,7 +46,8 @@ NOISELESS = Drive()
 class Promise(NamedTuple):
     """What must hold: ``test`` raises `ConformanceError` with a counter-example.
 
-    ``unless`` excuses estimators with any of these tags, ``needs`` those without any of these.
+    ``unless`` excuses estimators with any of these tags, ``needs`` those without any of these, ``offers`` those that
+    are not of this kind.
     """
 
     id: str
@@ -50,9 +55,13 @@ class Promise(NamedTuple):
     test: Callable[[Kind], None]
     unless: frozenset[Tag]
     needs: frozenset[Tag]
+    offers: Kind
 
-    def excuse(self, tags: frozenset[Tag]) -> str:
-        """Why the promise does not apply to an estimator with ``tags``; "" where it does."""
+    def excuse(self, made: Kind) -> str:
+        """Why the promise does not apply to the class ``made``; "" where it does."""
+        tags: frozenset[Tag] = getattr(made, "tags", frozenset())
+        if not issubclass(made, self.offers):
+            return f"asked only of a {self.offers.__name__}"
         if barred := self.unless & tags:
             return f"not asked of an estimator tagged {', '.join(sorted(tag.value for tag in barred))}"
         if self.needs and not self.needs & tags:
@@ -64,10 +73,10 @@ PROMISES: list[Promise] = []
 
 
 def _promise(
-    promise_id: str, reason: str, *, unless: Sequence[Tag] = (), needs: Sequence[Tag] = ()
+    promise_id: str, reason: str, *, unless: Sequence[Tag] = (), needs: Sequence[Tag] = (), offers: Kind = object
 ) -> Callable[[Callable[[Kind], None]], Callable[[Kind], None]]:
     def enlist(test: Callable[[Kind], None]) -> Callable[[Kind], None]:
-        PROMISES.append(Promise(promise_id, reason, test, frozenset(unless), frozenset(needs)))
+        PROMISES.append(Promise(promise_id, reason, test, frozenset(unless), frozenset(needs), offers))
         return test
 
     return enlist
@@ -403,3 +412,37 @@ def _global_start(made: Kind) -> None:
     last = _updates(made, NOISELESS, prior=replace(unknown, pose=Pose(-1.0, 9.0, 0.0)))[-1].estimate
     off = _apart(last.pose, NOISELESS.pose(last.time_ns), heading=False)
     _require(last.valid and off < NEAR_M, f"from an unknown position, the error after 20 s is {off:.3f} m")
+
+
+@_promise("particles", "Particles are the belief itself, and showing them changes nothing.", offers=ParticleEstimator)
+def _particles(made: Kind) -> None:
+    world = NOISY.world()
+    estimator = made(world)
+    tracker, asked = Tracker(estimator, world, NOISY.prior(), seed=SEED), list[Update]()
+    for measurement in NOISY.measurements():
+        asked += tracker.push(measurement)
+        shown = tracker.particles()
+        if shown is not None:
+            _be_the_belief(shown, asked[-1])
+    _same(_updates(made, NOISY), asked, "showing the particles changed the answer")
+
+
+def _be_the_belief(shown: Particles, update: Update) -> None:
+    """Points with weights that sum to one, about the estimate."""
+    positions, weights = shown
+    _require(
+        weights.ndim == 1 and len(weights) > 0 and positions.shape == (len(weights), 2),
+        f"{_at(update)} positions have shape {positions.shape}, weights {weights.shape}; (n, 2) and (n,) are asked for",
+    )
+    _require(np.isfinite(positions).all(), f"{_at(update)} a particle's position is not finite")
+    _require(
+        (weights >= 0.0).all() and math.isclose(weights.sum(), 1.0, rel_tol=1e-6),
+        f"{_at(update)} the weights are {weights.min():.6g} to {weights.max():.6g}, and sum to {weights.sum():.9g}",
+    )
+    mean, here = weights @ positions, update.estimate.pose[:2]
+    spread = math.sqrt(float(weights @ np.square(positions - mean).sum(axis=1)))
+    off = math.dist(mean, here)
+    _require(
+        off < NEAR_SHARE * spread + EXACT_M or not update.estimate.valid,
+        f"{_at(update)} the particles' mean is {off:.3g} m from the estimate, and they spread over {spread:.3g} m",
+    )

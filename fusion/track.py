@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from fusion.errors import PluginError
-from fusion.estimator import Estimator
+from fusion.estimator import Estimator, ParticleEstimator, Particles
 from fusion.odometry import Odometer, OdometerState
 from fusion.screen import refused, screen, unusable
 from fusion.values import Decision, Estimate, Fate, Measurement, Prior, Ranges, Reason, WifiScan, nanoseconds
@@ -81,6 +81,11 @@ class Tracker:
             return self._recent[-1].key, self._recent[-1].after
         return self._base_key, self._base
 
+    @property
+    def time_ns(self) -> int:
+        """The time of the newest measurement, or of the prior before the first."""
+        return self._newest[0][0]
+
     def estimate(self, time_ns: int) -> Estimate:
         """The belief at ``time_ns``, motion held on the last twist; not before the newest measurement."""
         (newest_ns, *_), moment = self._newest
@@ -90,6 +95,12 @@ class Tracker:
         for odometry in motion:
             belief, _ = self._estimator.step(belief, odometry)
         return self._estimator.estimate(belief, time_ns)
+
+    def particles(self) -> Particles | None:
+        """The belief after the newest measurement as weighted points; None of an estimator that does not offer them."""
+        if not isinstance(self._estimator, ParticleEstimator):
+            return None
+        return self._estimator.particles(self._newest[1].belief)
 
     def push(self, measurement: Measurement) -> list[Update]:
         """Take one measurement in; the first update is its own, those after it are revisions it caused."""

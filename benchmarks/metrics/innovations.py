@@ -8,11 +8,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from benchmarks.metrics.consistency import CHI_SQUARE_95
+from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.quantiles import mean
-from benchmarks.metrics.track import FateColumns, Floats
+from benchmarks.metrics.track import Floats
 
 NAMES = ("wifi", "ranges", "gyro", "ticks", "command", "odom")
-"""Of `benchmarks.metrics.track.KINDS`."""
+"""Of `benchmarks.metrics.fates.KINDS`."""
 LAGS = 10
 """Of the Ljung-Box test; a series of fewer than five times as many values is tested up to a fifth of its length."""
 

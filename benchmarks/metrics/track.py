@@ -6,22 +6,18 @@ Updates are objects, one per measurement; every metric wants arrays. They are tu
 from __future__ import annotations
 
 from collections.abc import Sequence
-from io import BytesIO
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fusion import Decision, Estimate, Gyro, MotorCommand, Odometry, Ranges, Reason, Update, WheelTicks, WifiScan
+from fusion import Decision, Estimate, Ranges, Reason, Update, WifiScan
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Stamps = Whole
 Flags = NDArray[np.bool_]
-Codes = NDArray[np.int16]
 
-DECISIONS, REASONS = tuple(Decision), tuple(Reason)
-KINDS = (WifiScan, Ranges, Gyro, WheelTicks, MotorCommand, Odometry)
 BEFORE_ALL_NS = np.iinfo(np.int64).min
 NO_CLAIM = (np.nan,) * 6
 BELIEVED = (Decision.USED, Decision.DOWNWEIGHTED)
@@ -125,74 +121,3 @@ def _is_fix(update: Update) -> bool:
     if not isinstance(update.measurement, WifiScan | Ranges):
         return False
     return any(fate.decision in BELIEVED and fate.weight > 0.0 for fate in update.fates)
-
-
-class FateColumns(NamedTuple):
-    """The last word on every reading, m rows in time order. ``kind`` counts into `KINDS`, ``sensor`` and ``anchor``
-    into ``names``, ``decision`` and ``reason`` into `DECISIONS` and `REASONS`. Innovations are NaN where a method
-    predicts none.
-    """
-
-    time_ns: Stamps
-    kind: Codes
-    sensor: Codes
-    anchor: Codes
-    decision: Codes
-    reason: Codes
-    weight: Floats
-    innovation: Floats
-    innovation_variance: Floats
-    nis: Floats
-    names: NDArray[np.str_]
-
-    @classmethod
-    def of(cls, updates: Sequence[Update]) -> FateColumns:
-        """The columns of the fates of updates in time order."""
-        fates = [fate for update in updates for fate in update.fates]
-        kinds = [KINDS.index(type(update.measurement)) for update in updates for _ in update.fates]
-        names = sorted({name for fate in fates for name in (fate.sensor, fate.anchor)})
-        place = {name: code for code, name in enumerate(names)}
-        decisions, reasons = ({item: code for code, item in enumerate(items)} for items in (DECISIONS, REASONS))
-        numbers = [(fate.weight, fate.innovation, fate.innovation_variance, fate.nis) for fate in fates]
-        weight, innovation, variance, nis = np.array(numbers, dtype=np.float64).reshape(-1, 4).T
-        return cls(
-            np.array([fate.time_ns for fate in fates], dtype=np.int64),
-            np.array(kinds, dtype=np.int16),
-            np.array([place[fate.sensor] for fate in fates], dtype=np.int16),
-            np.array([place[fate.anchor] for fate in fates], dtype=np.int16),
-            np.array([decisions[fate.decision] for fate in fates], dtype=np.int16),
-            np.array([reasons[fate.reason] for fate in fates], dtype=np.int16),
-            weight,
-            innovation,
-            variance,
-            nis,
-            np.array(names, dtype=np.str_),
-        )
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """How many readings met each decision."""
-        found = np.bincount(self.decision, minlength=len(DECISIONS))
-        return {decision.value: int(count) for decision, count in zip(DECISIONS, found, strict=True)}
-
-    @property
-    def nis_mean(self) -> float | None:
-        """Over all readings that have one; None where there are none, or not all are finite."""
-        known = self.nis[~np.isnan(self.nis)]
-        return float(known.mean()) if len(known) and np.isfinite(known).all() else None
-
-
-def to_bytes(track: Track, fates: FateColumns) -> bytes:
-    """Both as one NPZ file."""
-    buffer = BytesIO()
-    columns = {f"track_{name}": column for name, column in track._asdict().items()}
-    columns |= {f"fates_{name}": column for name, column in fates._asdict().items()}
-    np.savez(buffer, **columns)
-    return buffer.getvalue()
-
-
-def from_bytes(content: bytes) -> tuple[Track, FateColumns]:
-    """What `to_bytes` has written."""
-    with np.load(BytesIO(content), allow_pickle=False) as stored:
-        track = Track(*(stored[f"track_{name}"] for name in Track._fields))
-        return track, FateColumns(*(stored[f"fates_{name}"] for name in FateColumns._fields))

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.metrics.archive import from_bytes
 from benchmarks.metrics.bound import Places, Radio, fix_error
 from benchmarks.metrics.deviation import Errors, errors
 from benchmarks.metrics.instants import Answers, Instants, evaluation_instants, match
-from benchmarks.metrics.track import Floats, from_bytes
+from benchmarks.metrics.track import Floats
 from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.plan_verb import STORE
 from benchmarks.runner.results import RANKED_BY, Result, by_contestant, comparison, judged, median_metrics

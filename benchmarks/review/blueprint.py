@@ -29,7 +29,7 @@ def blueprint(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa:
     """The layout for the lanes ``drawn``, the best first."""
     import rerun.blueprint as rrb
 
-    pages = [_overview(frame, run, drawn), _readings(frame, run, drawn), _motion(frame)]
+    pages = [_overview(frame, run, drawn), _readings(run, drawn), _motion()]
     pages += [rrb.Vertical(table_view(drawn), name="Table")] if run.truth is not None else []
     return rrb.Blueprint(
         rrb.Tabs(*pages, active_tab=0),
@@ -48,35 +48,35 @@ def _overview(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa:
     left = rrb.Vertical(map_view(frame, run, drawn), scores, row_shares=[2, 1])
     # More names than that hide the plot; the map's own legend stands beside it.
     titles = {"Position error (m)": "/error", "Heading error (°)": "/heading_error"}
-    errors = [plot(frame, title, origin, legend=len(drawn) <= SHOWN) for title, origin in titles.items()]
-    details = _details(frame, drawn)
+    errors = [plot(title, origin, legend=len(drawn) <= SHOWN) for title, origin in titles.items()]
+    details = _details(drawn)
     right = [(tabs(errors), 2.0)] if has_truth else []
-    right += [_reception(frame, run, drawn)]
+    right += [_reception(run, drawn)]
     right += [(tabs(details), 3.6)] if details else []
     views, shares = zip(*right, strict=True)
     return rrb.Horizontal(left, rrb.Vertical(*views, row_shares=shares), column_shares=[3, 2], name="Overview")
 
 
-def _reception(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> tuple[Any, float]:
+def _reception(run: Run, drawn: Sequence[Drawing]) -> tuple[Any, float]:
     """What the radio said and what was made of it, and their height; in front is what has something to tell."""
     told = [drawing for drawing in drawn if drawing.shown and not drawing.ghost and drawing.states.state]
-    lanes = [state_view(frame, told)] if told else []
+    lanes = [state_view(told)] if told else []
     eventful = any(state in (State.REJECT, State.LOST) for drawing in told for state in drawing.states.state)
     if eventful:
-        return tabs(lanes + _radio(frame, run)), max(1.5, 0.6 + 0.28 * len(told))
-    return tabs(_radio(frame, run) + lanes), 1.8
+        return tabs(lanes + _radio(run)), max(1.5, 0.6 + 0.28 * len(told))
+    return tabs(_radio(run) + lanes), 1.8
 
 
-def _radio(frame: Frame, run: Run) -> list[Any]:
+def _radio(run: Run) -> list[Any]:
     """A plot for each kind of radio reading the run holds."""
     kinds = {type(measurement) for measurement in run.measurements}
-    plots = [plot(frame, "Ranges (m)", "/ranges")] if Ranges in kinds else []
+    plots = [plot("Ranges (m)", "/ranges")] if Ranges in kinds else []
     if WifiScan in kinds or not plots:
-        plots.append(plot(frame, "Signal strength (dBm)", "/rssi"))
+        plots.append(plot("Signal strength (dBm)", "/rssi"))
     return plots
 
 
-def _details(frame: Frame, drawn: Sequence[Drawing]) -> list[Any]:
+def _details(drawn: Sequence[Drawing]) -> list[Any]:
     """A tab for each estimator: does its error fit its claim, and what happened to it?"""
     import rerun as rr
     import rerun.blueprint as rrb
@@ -90,8 +90,11 @@ def _details(frame: Frame, drawn: Sequence[Drawing]) -> list[Any]:
                 (f"{axis.name} error and ±1σ ({axis.unit})", rr.new_entity_path([*place, axis.name])) for axis in AXES
             ]
             nees = f"{name}: NEES; 95 % should lie between the lines"
-            views += [tabs([plot(frame, title, origin, legend=False) for title, origin in axes])]
-            views += [plot(frame, nees, rr.new_entity_path(["nees", name]), top=_nees_top(drawing), legend=False)]
+            views += [tabs([plot(title, origin, legend=False) for title, origin in axes])]
+            views += [plot(nees, rr.new_entity_path(["nees", name]), top=_nees_top(drawing), legend=False)]
+        if drawing.lane.clouds is not None:
+            effective = f"{name}: effective number of particles"
+            views += [plot(effective, rr.new_entity_path(["neff", name]), legend=False)]
         views += [event_view(name)] if drawing.events.text else []
         if views:
             details.append(rrb.Vertical(*views, name=name))
@@ -105,7 +108,7 @@ def _nees_top(drawing: Drawing) -> float:
     return max(NEES_SHOWN, quantile(nees, 0.9)) if len(nees) else NEES_SHOWN
 
 
-def _readings(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
+def _readings(run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
     """The radio in full: what was read, and how far each estimator believed it."""
     import rerun as rr
     import rerun.blueprint as rrb
@@ -114,17 +117,17 @@ def _readings(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa:
     for drawing in (drawing for drawing in drawn if drawing.gates):
         name = drawing.name
         weight = f"{name}: weight of readings, coloured as above"
-        views = [plot(frame, weight, rr.new_entity_path(["weight", name]), top=1.0, legend=False)]
+        views = [plot(weight, rr.new_entity_path(["weight", name]), top=1.0, legend=False)]
         if drawing.tells_nis:
             nis = f"{name}: NIS of readings; the line is exceeded once in twenty"
-            views.append(plot(frame, nis, rr.new_entity_path(["nis", name]), top=NIS_SHOWN, legend=False))
+            views.append(plot(nis, rr.new_entity_path(["nis", name]), top=NIS_SHOWN, legend=False))
         gates.append(rrb.Vertical(*views, name=name))
-    return rrb.Vertical(*_radio(frame, run), *([tabs(gates)] if gates else []), name="Radio")
+    return rrb.Vertical(*_radio(run), *([tabs(gates)] if gates else []), name="Radio")
 
 
-def _motion(frame: Frame) -> Any:  # noqa: ANN401
+def _motion() -> Any:  # noqa: ANN401
     """The motion sensors as they came."""
     import rerun.blueprint as rrb
 
-    speeds = plot(frame, "Speed (m/s)", f"/raw/{SPEED}")
-    return rrb.Vertical(speeds, plot(frame, "Turn rate (°/s)", f"/raw/{TURN_RATE}"), name="Motion")
+    speeds = plot("Speed (m/s)", f"/raw/{SPEED}")
+    return rrb.Vertical(speeds, plot("Turn rate (°/s)", f"/raw/{TURN_RATE}"), name="Motion")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from benchmarks.colours import Colour
 from benchmarks.metrics.track import Floats, Stamps
-from benchmarks.review.frame import TIMELINE
+from benchmarks.review.frame import TIMELINE, UTC
 
 MOST_POSES = 6000
 """Poses of one drawn track: more cost the viewer time and show nothing. Scores are never thinned."""
@@ -27,11 +27,12 @@ Rows = TypeVar("Rows", NDArray[np.int64], Floats)
 
 
 class Canvas(NamedTuple):
-    """The Rerun module, its recording, and the time that counts as zero."""
+    """The Rerun module, its recording, the time that counts as zero, and the timelines there are."""
 
     rr: Any
     recording: Any
     start_ns: int
+    timelines: tuple[str, ...] = (TIMELINE,)
 
     def style(self, path: Place, *archetypes: Any) -> None:  # noqa: ANN401 - Rerun's own values
         """What holds at all times."""
@@ -39,9 +40,11 @@ class Canvas(NamedTuple):
 
     def columns(self, path: Place, time_ns: Stamps, *columns: Any) -> None:  # noqa: ANN401
         """One row per time [ns]."""
-        index = self.rr.TimeColumn(TIMELINE, duration=(time_ns - self.start_ns).astype("timedelta64[ns]"))
+        indexes = [self.rr.TimeColumn(TIMELINE, duration=(time_ns - self.start_ns).astype("timedelta64[ns]"))]
+        if UTC in self.timelines:
+            indexes.append(self.rr.TimeColumn(UTC, timestamp=time_ns.astype("datetime64[ns]")))
         for column in columns:
-            self.recording.send_columns(self.rr.new_entity_path(list(path)), [index], column)
+            self.recording.send_columns(self.rr.new_entity_path(list(path)), indexes, column)
 
     def dots(self, path: Place, name: str, colour: Colour, time_ns: Stamps, values: Floats) -> None:
         """A dot per (time [ns], value)."""

@@ -12,9 +12,10 @@ import numpy as np
 from benchmarks.cell import Score
 from benchmarks.colours import Colour, colour_of
 from benchmarks.lane import Lane
+from benchmarks.metrics.fates import FateColumns, fates_per_update
 from benchmarks.metrics.instants import Answers, Instants, evaluation_instants, match, wrap_angles
-from benchmarks.metrics.track import Floats
-from benchmarks.review.columns import DrawnFates, DrawnTrack, EstimateColumns
+from benchmarks.metrics.track import Floats, Whole
+from benchmarks.review.columns import DrawnTrack, EstimateColumns
 from benchmarks.review.events import Events, States, events, states
 from benchmarks.table import ranked
 from fusion import Reason
@@ -79,15 +80,20 @@ class Drawing:
         """What it said of itself."""
         return EstimateColumns.of_updates(self.lane.final)
 
+    @property
+    def fates(self) -> FateColumns:
+        """What became of the readings."""
+        return self.lane.fates
+
     @cached_property
-    def fates(self) -> DrawnFates:
-        """What became of the readings; of a ghost's nothing is shown."""
-        return DrawnFates.of_updates(() if self.ghost else self.lane.final)
+    def fate_update(self) -> Whole:
+        """The index in ``Lane.final`` of the update that each of them belongs to, (m,)."""
+        return np.repeat(np.arange(len(self.lane.final)), fates_per_update(self.lane.final))
 
     @cached_property
     def states(self) -> States:
         """When its state changed."""
-        return states(self.estimates, self.fates)
+        return states(self.estimates, self.fates, self.fate_update)
 
     @cached_property
     def events(self) -> Events:
@@ -96,8 +102,8 @@ class Drawing:
 
     @cached_property
     def gates(self) -> bool:
-        """Whether it listens to the radio at all, so that there is a weight to show."""
-        return not bool(self.fates.of(Reason.KIND_NOT_CONSUMED).all())
+        """Whether it listens to the radio at all, so that there is a weight to show; of a ghost none is shown."""
+        return not self.ghost and not bool(self.fates.met(Reason.KIND_NOT_CONSUMED).all())
 
     @cached_property
     def tells_nis(self) -> bool:

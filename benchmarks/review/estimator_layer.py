@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.colours import ANCHOR, REFUSED
+from benchmarks.metrics.fates import fates_of
 from benchmarks.metrics.score import CHI_SQUARE_95
 from benchmarks.metrics.track import Floats
 from benchmarks.review.canvas import STRONG, Canvas, Place, thinned
@@ -15,6 +16,8 @@ from benchmarks.review.paths import draw_path
 from fusion import Reason, World
 
 CIRCLE_OPACITY = 130
+PARTICLE_OPACITY, PARTICLE_PIXELS = (70, 200), (0.75, 2.25)
+"""Opacity and radius of a particle without weight, and of the heaviest one of its cloud."""
 GHOST_THICKNESS = 0.5
 """Of the lines of what would have been, against those of what was."""
 
@@ -34,6 +37,7 @@ def draw_on_map(canvas: Canvas, world: World, readings: Heard, drawing: Drawing,
     if not drawing.ghost:
         _draw_ellipses(canvas, [*place, "covariance"], drawing)
         _draw_circles(canvas, [*place, "readings"], world, readings, drawing)
+        _draw_particles(canvas, [*place, "particles"], drawing)
 
 
 def _draw_ellipses(canvas: Canvas, place: Place, drawing: Drawing) -> None:
@@ -80,22 +84,41 @@ def _draw_circles(canvas: Canvas, place: Place, world: World, readings: Heard, d
     when the estimator believed it wholly, vermillion when not at all.
     """
     fates, rr = drawing.fates, canvas.rr
-    asked = ~fates.of(Reason.KIND_NOT_CONSUMED)
-    radius_m = np.array([readings.radius_of.get(fate[:4], np.nan) for fate in fates.fates], dtype=np.float64)
+    asked = ~fates.met(Reason.KIND_NOT_CONSUMED)
+    radius_m = readings.radii(fates_of(drawing.lane.final))
     drawn = asked & np.isfinite(radius_m)
     if not drawn.any():
         return
     # An update none of whose readings makes a circle still takes away those of the one before.
-    updates, first = np.unique(fates.update[asked], return_index=True)
-    lengths = np.bincount(np.searchsorted(updates, fates.update[drawn]), minlength=len(updates))
+    updates, first = np.unique(drawing.fate_update[asked], return_index=True)
+    lengths = np.bincount(np.searchsorted(updates, drawing.fate_update[drawn]), minlength=len(updates))
     position = {anchor.id: (anchor.x, anchor.y) for anchor in world.anchors}
+    centers = np.array([position.get(name, (np.nan, np.nan)) for name in fates.names.tolist()])
     circles = {
-        "centers": np.array([position[name] for name in fates.name[drawn].tolist()]),
+        "centers": centers[fates.anchor[drawn]],
         "half_sizes": np.repeat(radius_m[drawn, None], 2, axis=1),
         "colors": weight_colours(fates.weight[drawn]),
     }
     canvas.style(place, rr.Ellipses2D.from_fields(line_radii=[-0.75]))
     canvas.columns(place, fates.time_ns[asked][first], rr.Ellipses2D.columns(**circles).partition(lengths))
+
+
+def _draw_particles(canvas: Canvas, place: Place, drawing: Drawing) -> None:
+    """The clouds, the larger and the stronger the heavier a particle is among those of its cloud."""
+    clouds, rr = drawing.lane.clouds, canvas.rr
+    if clouds is None:
+        return
+    starts = np.concatenate([[0], np.cumsum(clouds.lengths)[:-1]])
+    share = clouds.weights / np.repeat(np.maximum.reduceat(clouds.weights, starts), clouds.lengths)
+    opacity = np.interp(share, (0.0, 1.0), PARTICLE_OPACITY).round().astype(np.uint32)
+    red, green, blue = drawing.colour
+    columns = {
+        "positions": clouds.positions,
+        "radii": -np.interp(np.sqrt(share), (0.0, 1.0), PARTICLE_PIXELS),
+        "colors": opacity + ((red << 24) + (green << 16) + (blue << 8)),
+    }
+    canvas.style(place, rr.Points2D.from_fields(draw_order=-10.0))
+    canvas.columns(place, clouds.cloud_ns, rr.Points2D.columns(**columns).partition(clouds.lengths))
 
 
 def weight_colours(weights: Floats) -> NDArray[np.uint8]:

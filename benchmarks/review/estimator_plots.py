@@ -39,6 +39,7 @@ def draw_over_time(canvas: Canvas, world: World, frame: Frame, drawing: Drawing)
     if not drawing.ghost:
         _draw_consistency(canvas, drawing)
         _draw_nees(canvas, drawing)
+        _draw_effective_number(canvas, drawing)
         _draw_gating(canvas, world, frame, drawing)
         _draw_states(canvas, drawing)
         _draw_events(canvas, drawing)
@@ -83,6 +84,13 @@ def _draw_nees(canvas: Canvas, drawing: Drawing) -> None:
         canvas.line([*place, end], f"95 % {end}", TRUTH, *corners(time_ns, bound), width=1.0, merge="Off")
 
 
+def _draw_effective_number(canvas: Canvas, drawing: Drawing) -> None:
+    clouds = drawing.lane.clouds
+    if clouds is not None:
+        look = (["neff", drawing.name], "effective particles", drawing.colour)
+        canvas.line(*look, clouds.time_ns, clouds.effective_number)
+
+
 def corners(time_ns: Stamps, values: Floats) -> tuple[Stamps, Floats]:
     """The rows of a step-wise constant column that matter: the first, the last, and both sides of each step."""
     step = np.flatnonzero(np.diff(values))
@@ -93,9 +101,9 @@ def corners(time_ns: Stamps, values: Floats) -> tuple[Stamps, Floats]:
 def _draw_gating(canvas: Canvas, world: World, frame: Frame, drawing: Drawing) -> None:
     """Weight and NIS of every reading, one series per anchor; a reading without anchor goes by its sensor."""
     fates, name = drawing.fates, drawing.name
-    heard = ~fates.of(Reason.KIND_NOT_CONSUMED)
-    for anchor in np.unique(fates.name[heard]).tolist():
-        own = heard & (fates.name == anchor)
+    heard, source = ~fates.met(Reason.KIND_NOT_CONSUMED), fates.source
+    for code in np.unique(source[heard]).tolist():
+        own, anchor = heard & (source == code), str(fates.names[code])
         colour = anchor_colour(world, anchor)
         canvas.dots(["weight", name, anchor], anchor, colour, fates.time_ns[own], fates.weight[own])
         canvas.dots(["nis", name, anchor], anchor, colour, fates.time_ns[own], fates.nis[own])

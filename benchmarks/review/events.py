@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.metrics.track import Stamps
-from benchmarks.review.columns import MEMBERS, Codes, DrawnFates, EstimateColumns
+from benchmarks.metrics.fates import DECISIONS, REASONS, FateColumns
+from benchmarks.metrics.track import Stamps, Whole
+from benchmarks.review.columns import EstimateColumns
 from fusion import Decision, Reason, Update
 
 LOST_PROBABILITY = 0.5
@@ -49,9 +50,11 @@ class Events(NamedTuple):
     text: list[str]
 
 
-def states(estimates: EstimateColumns, fates: DrawnFates) -> States:
-    """The states of a lane; none for a method that never judged a reading and was never lost."""
-    judged = _judged(fates, len(estimates.valid))
+def states(estimates: EstimateColumns, fates: FateColumns, fate_update: Whole) -> States:
+    """The states of a lane; none for a method that never judged a reading and was never lost. ``fate_update`` (m,):
+    the index of the estimate that each of ``fates`` led to.
+    """
+    judged = _judged(fates, fate_update, len(estimates.valid))
     last = np.maximum.accumulate(np.where(judged >= 0, np.arange(len(judged)), 0))
     located = np.logical_or.accumulate(estimates.valid)
     begun = np.logical_or.accumulate(judged >= 0) & located
@@ -63,17 +66,17 @@ def states(estimates: EstimateColumns, fates: DrawnFates) -> States:
     return States(estimates.time_ns[changes], [State(code) for code in state[changes].tolist()])
 
 
-def _judged(fates: DrawnFates, count: int) -> Codes:
+def _judged(fates: FateColumns, fate_update: Whole, count: int) -> Whole:
     """For each update whether its readings were taken (ACCEPT), all refused (REJECT), or not judged (-1)."""
-    taken = fates.of(Decision.USED, Decision.DOWNWEIGHTED)
-    refused = fates.of(Decision.REJECTED) | fates.of(*OWN_REFUSALS)
+    taken = fates.met(Decision.USED, Decision.DOWNWEIGHTED)
+    refused = fates.met(Decision.REJECTED) | fates.met(*OWN_REFUSALS)
     judged = np.full(count, -1, dtype=np.int64)
-    judged[fates.update[refused]] = State.REJECT.value
-    judged[fates.update[taken]] = State.ACCEPT.value
+    judged[fate_update[refused]] = State.REJECT.value
+    judged[fate_update[taken]] = State.ACCEPT.value
     return judged
 
 
-def events(updates: Sequence[Update], estimates: EstimateColumns, fates: DrawnFates) -> Events:
+def events(updates: Sequence[Update], estimates: EstimateColumns, fates: FateColumns) -> Events:
     """Rejected, late and unusable readings, resets, and the position's loss and return."""
     rows = [*_readings(fates), *_resets(updates, estimates.reset_count), *_losses(estimates)]
     rows.sort()
@@ -83,22 +86,22 @@ def events(updates: Sequence[Update], estimates: EstimateColumns, fates: DrawnFa
 Row = tuple[int, str, str]
 
 
-def _readings(fates: DrawnFates) -> list[Row]:
+def _readings(fates: FateColumns) -> list[Row]:
     """One line per reading that was not taken; what a method does not listen to is no event."""
-    chosen = fates.of(Decision.REJECTED, Decision.LATE, Decision.UNUSABLE) & ~fates.of(Reason.KIND_NOT_CONSUMED)
-    columns = (fates.time_ns, fates.name, fates.decision, fates.reason, fates.nis)
+    chosen = fates.met(Decision.REJECTED, Decision.LATE, Decision.UNUSABLE) & ~fates.met(Reason.KIND_NOT_CONSUMED)
+    columns = (fates.time_ns, fates.names[fates.source], fates.decision, fates.reason, fates.nis)
     rows = zip(*(column[chosen].tolist() for column in columns), strict=True)
-    return [(t, *_told(name, MEMBERS[decision], MEMBERS[reason], nis)) for t, name, decision, reason, nis in rows]
+    return [(t, *_told(name, DECISIONS[decision], REASONS[reason], nis)) for t, name, decision, reason, nis in rows]
 
 
-def _told(name: str, decision: Decision | Reason, reason: Decision | Reason, nis: float) -> tuple[str, str]:
+def _told(name: str, decision: Decision, reason: Reason, nis: float) -> tuple[str, str]:
     why = reason.value.replace("_", " ")
     surprise = f", NIS {nis:.1f}" if np.isfinite(nis) else ""
     level = "WARN" if decision is Decision.REJECTED else "INFO"
     return level, f"{name} {decision.value}: {why}{surprise}"
 
 
-def _resets(updates: Sequence[Update], reset_count: Codes) -> list[Row]:
+def _resets(updates: Sequence[Update], reset_count: Whole) -> list[Row]:
     rows = []
     for place in np.flatnonzero(np.diff(reset_count, prepend=reset_count[:1]) > 0).tolist():
         estimate = updates[place].estimate

@@ -6,11 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fusion.values import seconds
+from fusion.values import NANOSECONDS, seconds
 from logs.run import Run
 
 TIMELINE = "t"
 """Time since the run's first message."""
+UTC = "utc"
+"""The same as date and time of day, where the stamps tell them."""
+UNIX_SINCE_NS = 1_000_000_000 * NANOSECONDS
+"""Stamps from here on, September 2001, count from 1970: no clock that counts from its own start has run so long."""
 LEGEND = 0.24
 """Room for the legend to the right of the floor, as a share of its width."""
 
@@ -38,6 +42,11 @@ class Frame(NamedTuple):
             ys += run.truth.y[known].tolist()
             stamps += run.truth.time_ns[known].tolist()
         return cls(min(xs), max(xs), min(ys), max(ys), min(stamps, default=0), max(stamps, default=0))
+
+    @property
+    def timelines(self) -> tuple[str, ...]:
+        """The time since the start, and UTC where the stamps are Unix time."""
+        return (TIMELINE, UTC) if self.start_ns >= UNIX_SINCE_NS else (TIMELINE,)
 
     @property
     def duration_s(self) -> float:

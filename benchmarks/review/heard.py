@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from itertools import repeat
+from operator import itemgetter
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.metrics.track import Floats, Stamps
-from fusion import Measurement, RangeReading, Ranges, RssiReading, WifiScan, World
+from fusion import Fate, Measurement, RangeReading, Ranges, RssiReading, WifiScan, World
 
 Identity: TypeAlias = tuple[int, str, int, str]
 """Time [ns], sensor, sequence number and anchor: what names one reading in a run."""
@@ -26,6 +29,11 @@ class Heard(NamedTuple):
     is_range: NDArray[np.bool_]
     value: Floats
     radius_of: Mapping[Identity, float]
+
+    def radii(self, fates: Sequence[Fate]) -> Floats:
+        """The radius [m] that each of ``fates`` (m,) speaks of; NaN for a reading that makes no circle."""
+        radius_m = map(self.radius_of.get, map(itemgetter(slice(4)), fates), repeat(math.nan))
+        return np.fromiter(radius_m, np.float64, len(fates))
 
 
 def heard(world: World, measurements: Sequence[Measurement]) -> Heard:

@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.metrics.fates import REASONS, FateColumns
 from benchmarks.metrics.instants import MAX_AGE_S
 from benchmarks.metrics.peaks import peaks
-from benchmarks.review.columns import MEMBERS, DrawnFates, Flags
+from benchmarks.metrics.track import Flags
 from benchmarks.review.drawing import Drawing
 from benchmarks.review.events import OWN_REFUSALS
 from fusion import Decision, Odometry, Reason, WheelTicks
@@ -81,10 +82,10 @@ def _of_estimates(drawing: Drawing, at_ns: int) -> Iterator[str]:
         yield f"belief replaced {resets} times" if resets > 1 else "belief replaced"
 
 
-def _of_reception(fates: DrawnFates, at_ns: int) -> Iterator[str]:
+def _of_reception(fates: FateColumns, at_ns: int) -> Iterator[str]:
     """Silence, or too few anchors at once: of what the host let through."""
-    heard = fates.of(Decision.USED, Decision.DOWNWEIGHTED, Decision.REJECTED) | fates.of(*OWN_REFUSALS)
-    time_ns, names = fates.time_ns[heard], fates.name[heard]
+    heard = fates.met(Decision.USED, Decision.DOWNWEIGHTED, Decision.REJECTED) | fates.met(*OWN_REFUSALS)
+    time_ns, names = fates.time_ns[heard], fates.names[fates.source[heard]]
     end = int(np.searchsorted(time_ns, at_ns, side="right"))
     if end == 0:
         yield "no radio yet"
@@ -111,24 +112,24 @@ def _last_view(time_ns: list[int], names: list[str]) -> int | None:
     return None
 
 
-def _of_judgement(fates: DrawnFates, at_ns: int) -> Iterator[str]:
+def _of_judgement(fates: FateColumns, at_ns: int) -> Iterator[str]:
     """What became of the readings just before."""
     recent = (fates.time_ns <= at_ns) & (fates.time_ns > at_ns - nanoseconds(JUST_BEFORE_S))
-    recent &= ~fates.of(Reason.KIND_NOT_CONSUMED)
+    recent &= ~fates.met(Reason.KIND_NOT_CONSUMED)
     total = int(recent.sum())
     for decision in (Decision.REJECTED, Decision.DOWNWEIGHTED, Decision.LATE, Decision.UNUSABLE):
-        own = recent & fates.of(decision)
+        own = recent & fates.met(decision)
         # One reading in two: an outlier here and there is what a gate is for.
         if own.sum() * 2 >= max(total, 1):
             yield f"{own.sum()} of {total} readings {decision.value} ({_reasons(fates, own)})"
-    taken = np.flatnonzero(recent & fates.of(Decision.USED) & (fates.nis > SURPRISING_NIS))
+    taken = np.flatnonzero(recent & fates.met(Decision.USED) & (fates.nis > SURPRISING_NIS))
     if len(taken):
         worst = taken[np.argmax(fates.nis[taken])]
-        yield f"{fates.name[worst]} taken with NIS {fates.nis[worst]:.1f}"
+        yield f"{fates.names[fates.source[worst]]} taken with NIS {fates.nis[worst]:.1f}"
 
 
-def _reasons(fates: DrawnFates, chosen: Flags) -> str:
-    return ", ".join(sorted({MEMBERS[code].value.replace("_", " ") for code in fates.reason[chosen].tolist()}))
+def _reasons(fates: FateColumns, chosen: Flags) -> str:
+    return ", ".join(sorted({REASONS[code].value.replace("_", " ") for code in fates.reason[chosen].tolist()}))
 
 
 def _of_motion(run: Run, at_ns: int) -> Iterator[str]:

@@ -30,7 +30,11 @@ def render(files: Sequence[Path], output: Path, *, at_s: float | None = None) ->
     for file in files:
         if not file.is_file():
             raise ViewerError(f"{file}: no such file; write one with `fusion review RUN.mcap --save {file}`")
-    output.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        output.touch()
+    except OSError as error:
+        raise ViewerError(f"{output}: the picture cannot be written ({error.strerror}); give another place") from error
     with headless_viewer(files) as client:
         go_to(client, at_s)
         _take_settled(client, output)

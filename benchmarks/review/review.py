@@ -6,7 +6,8 @@ import argparse
 import math
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ import fusion
 from benchmarks.arguments import at_least_one, since_start
 from benchmarks.bench import Settings, check, parse_settings
 from benchmarks.cell import Cell, Score, cached_run, score_lane
+from benchmarks.clouds import CloudWatch
 from benchmarks.lane import Lane, run_lane
 from benchmarks.review.counterfactual import Counterfactual, counterfactuals, ghost_lane
 from benchmarks.review.drawing import drawings
@@ -90,12 +92,19 @@ def review(
 
 def _folded(run: Run, chosen: Settings, instead: Sequence[Counterfactual], seed: int) -> tuple[list[Lane], list[Score]]:
     """What the estimators made of the run, and of what did not happen; each lane with its score."""
-    folds = [(run, run_lane(run, name, params, seed)) for name, params in chosen.items()]
+    folds = [(run, _watched_lane(run, name, params, seed)) for name, params in chosen.items()]
     folds += [
         (what_if.run, ghost_lane(name, params, what_if, seed)) for what_if in instead for name, params in chosen.items()
     ]
     scores = [score_lane(Cell(run.path, lane.name, {}, seed), folded, lane) for folded, lane in folds]
     return [lane for _, lane in folds], scores
+
+
+def _watched_lane(run: Run, name: str, params: Mapping[str, object], seed: int) -> Lane:
+    """A lane with the particles of an estimator that shows them."""
+    watch = CloudWatch(run)
+    lane = run_lane(run, name, params, seed, watch=watch)
+    return replace(lane, clouds=watch.clouds())
 
 
 def _worst(run: Run, lanes: Sequence[Lane], scores: Sequence[Score], count: int) -> list[Moment]:

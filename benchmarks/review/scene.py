@@ -47,7 +47,7 @@ def write_scene(output: Path, run: Run, lanes: Sequence[Lane], scores: Sequence[
     with _recording(base, identity, default_blueprint=blueprint(frame, run, drawn)) as recording:
         recording.send_recording_name(run.name)
         recording.send_property("run", rr.AnyValues(**properties(run, frame)))
-        canvas = Canvas(rr, recording, frame.start_ns)
+        canvas = Canvas(rr, recording, frame.start_ns, frame.timelines)
         draw_base(canvas, run, readings, axes, legend[0])
         canvas.style(["scores"], rr.TextDocument(markdown(scores), media_type="text/markdown"))
         for drawing, place in zip(drawn, legend[1:], strict=True):

@@ -42,17 +42,18 @@ def map_view(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: 
         contents="/map/**",
         background=list(GROUND),
         visual_bounds=bounds,
-        overrides=_overrides(drawn),
+        overrides=_overrides(frame, drawn),
     )
 
 
-def _overrides(drawn: Sequence[Drawing]) -> dict[Any, Any]:
+def _overrides(frame: Frame, drawn: Sequence[Drawing]) -> dict[Any, Any]:
     """Trails reach back from the cursor; tracks beyond the best are off, and so are all circles but the first's."""
     import rerun as rr
     import rerun.blueprint as rrb
 
     now = rrb.TimeRangeBoundary.cursor_relative
-    trail = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(TIMELINE, start=now(seconds=-TRAIL_S), end=now(seconds=0.0))])
+    lately = rr.TimeRange(start=now(seconds=-TRAIL_S), end=now(seconds=0.0))
+    trail = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(timeline, lately) for timeline in frame.timelines])
     hidden = rrb.EntityBehavior(visible=False)
     overrides: dict[Any, Any] = {rr.new_entity_path(["map", "truth", "trail"]): trail}
     circles = next((drawing.name for drawing in drawn if drawing.gates), None)
@@ -92,17 +93,17 @@ def cdf_view(drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
     )
 
 
-def _whole_run(frame: Frame) -> Any:  # noqa: ANN401
-    """All of the run, not only half a minute around the cursor."""
+def _whole_run() -> Any:  # noqa: ANN401
+    """All of the run on any timeline, not only half a minute around the cursor."""
     import rerun as rr
     import rerun.blueprint as rrb
 
-    edge = rrb.TimeRangeBoundary.absolute
-    whole = rr.TimeRange(start=edge(seconds=0.0), end=edge(seconds=max(frame.duration_s, 1.0)))
+    edge = rrb.TimeRangeBoundary.infinite
+    whole = rr.TimeRange(start=edge(), end=edge())
     return rrb.TimeAxis(view_range=whole)
 
 
-def plot(frame: Frame, name: str, origin: str, *, top: float | None = None, legend: bool = True) -> Any:  # noqa: ANN401
+def plot(name: str, origin: str, *, top: float | None = None, legend: bool = True) -> Any:  # noqa: ANN401
     """A plot of the whole run; ``top``: its values are in [0, top]."""
     import rerun.blueprint as rrb
     from rerun.blueprint.archetypes import PlotBackground
@@ -110,14 +111,14 @@ def plot(frame: Frame, name: str, origin: str, *, top: float | None = None, lege
     return rrb.TimeSeriesView(
         name=name,
         origin=origin,
-        axis_x=_whole_run(frame),
+        axis_x=_whole_run(),
         axis_y=None if top is None else rrb.ScalarAxis(range=(-0.04 * top, 1.04 * top)),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
         background=PlotBackground(color=list(GROUND)),
     )
 
 
-def state_view(frame: Frame, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
+def state_view(drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
     """A lane for each estimator, coloured by its state."""
     import rerun as rr
     import rerun.blueprint as rrb
@@ -126,7 +127,7 @@ def state_view(frame: Frame, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
         name="Was the last scan taken?",
         origin="/state",
         contents=[rr.new_entity_path(["state", drawing.name]) for drawing in drawn],
-        time_view=_whole_run(frame),
+        time_view=_whole_run(),
     )
 
 

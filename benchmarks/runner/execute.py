@@ -13,11 +13,12 @@ import numpy as np
 from benchmarks.cell import status_of
 from benchmarks.faults.faults import apply_faults
 from benchmarks.lane import Lane, run_lane
+from benchmarks.metrics.archive import from_bytes, to_bytes
 from benchmarks.metrics.innovations import innovation_metrics
 from benchmarks.metrics.instants import evaluation_instants, match
 from benchmarks.metrics.interpolation import meet
 from benchmarks.metrics.score import Errors, errors, metrics
-from benchmarks.metrics.track import Track, from_bytes, to_bytes
+from benchmarks.metrics.track import Track
 from benchmarks.review.frame import Frame
 from benchmarks.runner.definition import CLEAN, CellLimits
 from benchmarks.runner.plan import Cell, read_faults

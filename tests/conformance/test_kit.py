@@ -16,6 +16,7 @@ from fusion import (
     Increment,
     Odometry,
     ParameterError,
+    Particles,
     PluginError,
     Pose,
     Ranges,
@@ -284,6 +285,51 @@ class TooFar(Correct):
         return found._replace(pose=found.pose._replace(x=found.pose.x + 0.6))
 
 
+class WithParticles(Correct):
+    """Shows its belief as four points, which have its mean."""
+
+    def particles(self, state):
+        dx, dy = math.sqrt(state.covariance.xx), math.sqrt(state.covariance.yy)
+        cross = np.array([[dx, 0.0], [-dx, 0.0], [0.0, dy], [0.0, -dy]])
+        return Particles(np.array(state.pose[:2]) + cross, np.full(4, 0.25))
+
+
+class HeavyParticles(WithParticles):
+    def particles(self, state):
+        shown = super().particles(state)
+        return shown._replace(weights=4.0 * shown.weights)
+
+
+class ParticlesElsewhere(WithParticles):
+    def particles(self, state):
+        shown = super().particles(state)
+        return shown._replace(positions=shown.positions[:, ::-1])
+
+
+class ParticlesWithoutAPlace(WithParticles):
+    def particles(self, state):
+        shown = super().particles(state)
+        return shown._replace(positions=shown.positions[:3])
+
+
+class ParticlesThatAreNoNumbers(WithParticles):
+    def particles(self, state):
+        shown = super().particles(state)
+        return shown._replace(positions=shown.positions * math.nan)
+
+
+class MovedByBeingSeen(WithParticles):
+    shift = 0.0
+
+    def particles(self, state):
+        self.shift += 1e-9
+        return super().particles(state)
+
+    def estimate(self, state, time_ns):
+        found = super().estimate(state, time_ns)
+        return found._replace(pose=found.pose._replace(x=found.pose.x + self.shift))
+
+
 BROKEN = {
     GlobalDice: "same-bytes",
     SecretSeed: "no-hidden-dice",
@@ -311,10 +357,15 @@ BROKEN = {
     NoisePerMessage: "rate-means-nothing",
     SureOfItsHeading: "unknown-heading",
     StartsNowhere: "global-start",
+    HeavyParticles: "particles",
+    ParticlesElsewhere: "particles",
+    ParticlesWithoutAPlace: "particles",
+    ParticlesThatAreNoNumbers: "particles",
+    MovedByBeingSeen: "particles",
 }
 
 
-@pytest.mark.parametrize("check", list(checks(Correct)), ids=lambda check: check.id)
+@pytest.mark.parametrize("check", list(checks(WithParticles)), ids=lambda check: check.id)
 def test_correct_estimator_keeps_every_promise(check):
     check.run()
 
@@ -345,6 +396,13 @@ def test_verdicts_tell_broken_excused_and_skipped_apart():
     assert excused["outlier-is-bounded"].outcome is Outcome.EXCUSED
     assert skipped["outlier-is-bounded"].outcome is Outcome.SKIPPED
     assert "no_radio" in skipped["outlier-is-bounded"].detail
+
+
+def test_particles_are_asked_only_of_who_offers_them():
+    with registered("correct", Correct):
+        by_id = {verdict.id: verdict for verdict in run_checks("correct")}
+    assert by_id["particles"].outcome is Outcome.SKIPPED
+    assert "ParticleEstimator" in by_id["particles"].detail
 
 
 def test_excuse_that_is_not_needed_counts_as_broken():

@@ -145,3 +145,15 @@ def test_what_leaves_the_floor_stays_at_its_edge():
 def test_impossible_options_are_refused(options):
     with pytest.raises(ParameterError, match="bayes_grid"):
         BayesGrid(world(), **options)
+
+
+def test_particles_are_the_cells_with_their_probabilities():
+    grid, place = BayesGrid(world()), world()
+    state = grid.start(prior(), 0)
+    shown = grid.particles(state)
+    assert shown.weights.sum() == pytest.approx(1.0)
+    assert shown.weights @ shown.positions == pytest.approx(state.pose[:2], abs=1e-9)
+    bounds = place.bounds
+    assert (shown.positions >= (bounds.x_min, bounds.y_min)).all()
+    assert (shown.positions <= (bounds.x_max, bounds.y_max)).all()
+    assert len(np.unique(shown.positions, axis=0)) == state.histogram[0].size

@@ -129,3 +129,17 @@ def test_resampling_keeps_mean_and_covariance():
 def test_impossible_options_are_refused(options):
     with pytest.raises(ParameterError, match="particle"):
         Particle(world(), **options)
+
+
+def test_particles_are_the_cloud_and_go_along_with_the_motion_since():
+    filter_, measurements = Particle(world()), drive(seconds=1)[0]
+    state = filter_.start(prior(), 0)
+    at_start = filter_.particles(state)
+    for measurement in measurements[:4]:
+        state, _ = filter_.step(state, measurement)
+    shown = filter_.particles(state)
+    assert np.array_equal(shown.weights, state.weights)
+    assert np.array_equal(at_start.positions, state.cloud[:2].T)
+    moved_m = np.hypot(*(shown.positions - at_start.positions).T)
+    assert moved_m == pytest.approx(np.full(1000, 0.2), rel=1e-3)
+    assert shown.effective_number == pytest.approx(1000.0)

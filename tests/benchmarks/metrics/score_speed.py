@@ -12,14 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.metrics.archive import from_bytes, to_bytes
 from benchmarks.metrics.consistency import consistency_metrics, distribution_metrics
 from benchmarks.metrics.deviation import errors
 from benchmarks.metrics.drift import drift_metrics
 from benchmarks.metrics.dynamics import dynamic_metrics
+from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.instants import Instants, evaluation_instants, match
 from benchmarks.metrics.position import axis_metrics, heading_metrics, position_metrics, track_metrics
 from benchmarks.metrics.score import for_json, metrics
-from benchmarks.metrics.track import FateColumns, Track, from_bytes, to_bytes
+from benchmarks.metrics.track import Track
 from benchmarks.metrics.trajectory import trajectory_metrics
 from benchmarks.runner.store import to_json
 from logs.run import TruthTrack

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.innovations import innovation_metrics, ljung_box
-from benchmarks.metrics.track import FateColumns
 from fusion import Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, RssiReading, Update, WifiScan
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 import fusion
 from benchmarks.cell import Cell, score_lane
+from benchmarks.clouds import CloudWatch
 from benchmarks.lane import Lane
 from benchmarks.review.scene import write_scene
 from fusion import (
@@ -20,6 +21,7 @@ from fusion import (
     Estimate,
     Fate,
     Odometry,
+    Particles,
     Pose,
     RangeReading,
     Ranges,
@@ -27,10 +29,14 @@ from fusion import (
     Truth,
     Update,
 )
+from fusion.values import NANOSECONDS
 from logs.run import Run, TruthTrack
 
 RATE_HZ = 50
 STEPS_PER_SCAN = 10
+START_NS = 1_700_000_000 * NANOSECONDS
+WITH_PARTICLES = 2
+"""So many of the estimators show particles: ours are two of ten."""
 ANCHORS = [("a", 0.0, 0.0), ("b", 20.0, 0.0), ("c", 20.0, 15.0), ("d", 0.0, 15.0)]
 WORLD = fusion.World.from_table(
     {"name": "hall", "anchors": [{"id": name, "position_m": [x, y]} for name, x, y in ANCHORS]}
@@ -38,11 +44,11 @@ WORLD = fusion.World.from_table(
 
 
 def long_run(poses: int) -> Run:
-    """Circles in a hall: odometry and truth 50 times a second, ranges to four anchors 5 times a second."""
-    step_ns = 1_000_000_000 // RATE_HZ
+    """Circles in a hall, in Unix time: odometry and truth at 50 Hz, ranges to four anchors at 5 Hz."""
+    step_ns = NANOSECONDS // RATE_HZ
     truths, measurements = [], []
     for k in range(1, poses + 1):
-        now, angle = k * step_ns, 0.1 * k / RATE_HZ
+        now, angle = START_NS + k * step_ns, 0.1 * k / RATE_HZ
         truths.append(Truth(now, 10.0 + 5.0 * np.cos(angle), 7.0 + 5.0 * np.sin(angle), angle))
         measurements.append(Odometry(now, "wheels", k, now - step_ns, 0.5 / RATE_HZ, 0.1 / RATE_HZ))
         if k % STEPS_PER_SCAN == 0:
@@ -52,11 +58,32 @@ def long_run(poses: int) -> Run:
     return Run(Path("long.mcap"), "long", WORLD, None, {}, tuple(measurements), TruthTrack.from_truths(truths), (), {})
 
 
+class MadeUpTracker:
+    """Shows a new cloud of a thousand particles whenever it is asked."""
+
+    def __init__(self) -> None:
+        self.time_ns = 0
+        self._random = np.random.default_rng(1)
+
+    def particles(self) -> Particles:
+        weights = self._random.exponential(size=1000)
+        return Particles(self._random.normal(10.0, 2.0, (1000, 2)), weights / weights.sum())
+
+
+def watched(run: Run) -> CloudWatch:
+    """The clouds of an estimator that has particles."""
+    watch, tracker = CloudWatch(run), MadeUpTracker()
+    for measurement in run.measurements:
+        tracker.time_ns = measurement.time_ns
+        watch(tracker, measurement)
+    return watch
+
+
 def made_up_lane(run: Run, number: int) -> Lane:
     """Half a metre beside the truth; every twentieth reading is rejected."""
     covariance, updates = Covariance(0.25, 0.05, 0.0, 0.25, 0.0, 0.01), []
     for k, measurement in enumerate(run.measurements):
-        angle = 0.1 * measurement.time_ns / 1e9
+        angle = 0.1 * (measurement.time_ns - START_NS) / 1e9
         pose = Pose(10.5 + 5.0 * np.cos(angle), 7.0 + 5.0 * np.sin(angle), float(fusion.wrap_angle(angle)))
         fates = ()
         if isinstance(measurement, Ranges):
@@ -68,7 +95,8 @@ def made_up_lane(run: Run, number: int) -> Lane:
                 Fate(*head, r.anchor, *what, 0.1, 0.04, nis) for r, what in zip(measurement.readings, told, strict=True)
             )
         updates.append(Update(measurement, Estimate(measurement.time_ns, pose, covariance), fates))
-    return Lane(f"estimator {number}", tuple(updates), "", 0.0, None)
+    clouds = watched(run).clouds() if number < WITH_PARTICLES else None
+    return Lane(f"estimator {number}", tuple(updates), "", 0.0, None, clouds=clouds)
 
 
 def cost_s(poses: int, estimators: int, output: Path) -> float:

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from benchmarks.review.columns import DrawnFates, EstimateColumns
+from benchmarks.metrics.fates import FateColumns, fates_per_update
+from benchmarks.review.columns import EstimateColumns
 from benchmarks.review.events import State, events, states
 from fusion import Decision, Estimate, Fate, Pose, Reason, RssiReading, Update, WifiScan
 
@@ -23,12 +24,13 @@ def update(second, *judgements, nis=None, **claims):
 
 
 def told_states(*updates):
-    changes = states(EstimateColumns.of_updates(updates), DrawnFates.of_updates(updates))
+    fate_update = np.repeat(np.arange(len(updates)), fates_per_update(updates))
+    changes = states(EstimateColumns.of_updates(updates), FateColumns.of(updates), fate_update)
     return list(zip((changes.time_ns // SECOND_NS).tolist(), changes.state, strict=True))
 
 
 def told_events(*updates):
-    told = events(updates, EstimateColumns.of_updates(updates), DrawnFates.of_updates(updates))
+    told = events(updates, EstimateColumns.of_updates(updates), FateColumns.of(updates))
     return list(zip((told.time_ns // SECOND_NS).tolist(), told.level, told.text, strict=True))
 
 
@@ -85,12 +87,3 @@ def test_resets_and_losses_are_told_once_each():
         (4, "INFO", "position valid again"),
         (4, "WARN", "belief replaced (reset 1), moved by 5.00 m"),
     ]
-
-
-def test_columns_keep_what_the_fates_say():
-    columns = DrawnFates.of_updates([update(1, TAKEN), update(2), update(3, GATED, TAKEN, nis=2.0)])
-    assert columns.update.tolist() == [0, 2, 2]
-    assert columns.name.tolist() == ["ap0", "ap0", "ap1"]
-    assert columns.of(Decision.USED).tolist() == [True, False, True]
-    assert columns.of(Reason.GATE).tolist() == [False, True, False]
-    assert np.array_equal(columns.nis, [np.nan, 2.0, 2.0], equal_nan=True)

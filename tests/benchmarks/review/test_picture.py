@@ -47,7 +47,7 @@ def test_pages_behind_the_first_are_drawn_without_an_error_of_a_view(log, tmp_pa
     rrb = pytest.importorskip("rerun.blueprint", reason="needs the extra `review`")
 
     def all_pages(frame, run, drawn):
-        pages = (blueprint._readings(frame, run, drawn), blueprint._motion(frame), blueprint.table_view(drawn))
+        pages = (blueprint._readings(run, drawn), blueprint._motion(), blueprint.table_view(drawn))
         return rrb.Grid(*pages, blueprint.event_view("radio_only"))
 
     monkeypatch.setattr(blueprint, "_overview", all_pages)
@@ -109,6 +109,14 @@ def test_viewer_that_ends_at_once_is_told_with_the_remedy(tmp_path, monkeypatch)
     monkeypatch.setattr(viewer, "program", lambda: "false")
     with pytest.raises(ViewerError, match="mesa-vulkan-drivers"):
         render([scene], tmp_path / "review.png")
+
+
+def test_picture_that_cannot_be_written_is_told(tmp_path):
+    pytest.importorskip("rerun", reason="needs the extra `review`")
+    (tmp_path / "scene.rrd").write_bytes(b"")
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(ViewerError, match="cannot be written"):
+        render([tmp_path / "scene.rrd"], tmp_path / "file" / "review.png")
 
 
 def test_missing_scene_log_and_estimator_are_refused(log, tmp_path):

@@ -81,7 +81,9 @@ def test_web_refuses_a_folder_of_layers_and_says_what_it_takes(log, tmp_path, ca
     assert f"give --save {tmp_path / 'layers'}.rrd" in err
 
 
-@pytest.mark.parametrize("words", [["--at", "nan"], ["--at", "-1"], ["--reject", "inf"], ["--worst", "0"]])
+@pytest.mark.parametrize(
+    "words", [["--at", "nan"], ["--at", "abc"], ["--at", "-1"], ["--reject", "inf"], ["--worst", "0"]]
+)
 def test_numbers_that_mean_nothing_are_usage_errors(log, capsys, words):
     with pytest.raises(SystemExit) as ended:
         main(["review", str(log), *words])

@@ -1,6 +1,7 @@
 """What a review holds, read back from its file."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,10 +9,12 @@ from scipy.special import gammaincinv
 
 import fusion
 from benchmarks.cell import Cell, score_lane
+from benchmarks.clouds import MOST_POINTS, CloudWatch
 from benchmarks.colours import ESTIMATORS, colour_of
 from benchmarks.lane import run_lane
 from benchmarks.review.canvas import MOST_POSES, thinned
 from benchmarks.review.counterfactual import ghost_lane, without_anchor
+from benchmarks.review.estimator_layer import PARTICLE_PIXELS
 from benchmarks.review.estimator_plots import NEES_BOUNDS
 from benchmarks.review.paths import mostly_jumps
 from benchmarks.review.scene import markdown, write_scene
@@ -135,6 +138,36 @@ def test_review_holds_floor_truth_tracks_errors_weights_and_readings(tmp_path):
     expected |= {"/map/estimate/toy/covariance", "/error/toy", "/heading_error/toy"}
     expected |= {"/weight/toy/b", "/nis/toy/b", "/rssi/b"}
     assert expected <= chunks.keys()
+
+
+def test_run_in_unix_time_is_on_a_second_timeline_and_another_is_not(tmp_path):
+    since_start = run_of(tmp_path)
+    unix_ns = 1_627_997_452 * SECOND_NS
+    moved = [replace(scan, time_ns=scan.time_ns + unix_ns) for scan in since_start.measurements]
+    truth = replace(since_start.truth, time_ns=since_start.truth.time_ns + unix_ns)
+    run = replace(since_start, measurements=tuple(moved), truth=truth)
+    (scene,) = write_scene(tmp_path / "review.rrd", run, *scored(run, ["toy"]))
+    (batch,) = [batch for batch in chunks_of(scene)["/rssi/b"] if "t" in batch.schema.names]
+    assert batch.column("t")[0].as_py().total_seconds() == 0.0
+    assert batch.column("utc").to_numpy(zero_copy_only=False).astype(np.int64).tolist() == [m.time_ns for m in moved]
+    assert all("utc" not in b.schema.names for b in review_of(tmp_path, "toy")["/rssi/b"])
+
+
+def test_particles_and_their_effective_number_are_drawn_where_an_estimator_shows_them(tmp_path):
+    run = run_of(tmp_path)
+    watch = CloudWatch(run)
+    lanes = [replace(run_lane(run, "particle", watch=watch), clouds=watch.clouds()), run_lane(run, "toy")]
+    scores = [score_lane(Cell(run.path, lane.name, {}, 0), run, lane) for lane in lanes]
+    (scene,) = write_scene(tmp_path / "review.rrd", run, lanes, scores)
+    chunks = chunks_of(scene)
+    assert not {"/map/estimate/toy/particles", "/neff/toy"} & chunks.keys()
+    _, positions = column(chunks, "/map/estimate/particle/particles", "positions")
+    assert len(positions) == len(run.measurements)
+    assert all(100 < len(row) <= MOST_POINTS for row in positions)
+    _, radii = column(chunks, "/map/estimate/particle/particles", "radii")
+    assert [min(row) for row in radii] == pytest.approx([-PARTICLE_PIXELS[1]] * len(radii))
+    _, effective = column(chunks, "/neff/particle", "Scalars")
+    assert np.all((np.ravel(effective) > 1.0) & (np.ravel(effective) < 1000.001))
 
 
 def test_time_counts_from_the_first_message_and_errors_are_those_of_the_bench(tmp_path):
