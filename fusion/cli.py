@@ -29,6 +29,7 @@ VERBS = {
     "import": Verb("logs.importing", "turn a recording of another format into an MCAP log"),
     "export": Verb("logs.export", "turn a log into CSV or TUM files"),
     "info": Verb("logs.info", "what is in a log"),
+    "repair": Verb("logs.repair", "a log that a crash cut off, made whole again"),
     "bound": Verb("benchmarks.sites.site", "the least error a fix can have over a floor, and where an anchor helps"),
     "bench": Verb("benchmarks.bench", "score estimators on recorded runs"),
     "replay": Verb("benchmarks.replay", "run one estimator over a log and record what it said"),

@@ -26,6 +26,8 @@ from logs.messages import ESTIMATE_TOPIC, FATES_TOPIC, KINDS, SCHEMAS
 
 RUN_RECORD = "fusion"
 """Name of the metadata record that makes an MCAP file one of ours."""
+LIBRARY = "fusion"
+"""What the header of a log says of its writer."""
 FLUSH_NS = nanoseconds(1.0)
 SYNC_S = 0.9
 """A little less than a second, so that a flush which comes early by a hair is synced all the same."""
@@ -53,7 +55,7 @@ class RunWriter:
             raise LogError(f"{path}: cannot be written ({error}); choose another place") from error
         self._path = path
         self._writer = Writer(self._stream)
-        self._writer.start(profile="ros2", library="fusion")
+        self._writer.start(profile="ros2", library=LIBRARY)
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._flushed_ns: int | None = None
