@@ -28,7 +28,7 @@ VERBS = {
     "simulate": Verb("sensors.simulate", "drive a simulated robot and record it as an MCAP log"),
     "import": Verb("logs.importing", "turn a recording of another format into an MCAP log"),
     "export": Verb("logs.export", "turn a log into CSV or TUM files"),
-    "info": Verb("logs.info", "what is in a log"),
+    "info": Verb("logs.info", "what is in logs, what is odd about them, and which estimators could use them"),
     "repair": Verb("logs.repair", "a log that a crash cut off, made whole again"),
     "bound": Verb("benchmarks.sites.site", "the least error a fix can have over a floor, and where an anchor helps"),
     "bench": Verb("benchmarks.bench", "score estimators on recorded runs"),
