@@ -68,7 +68,7 @@ class Damage(NamedTuple):
     def seconds_lost(self) -> float | None:
         """The most that is lost [s], for a cut-off log if its recorder stopped there; None: nobody can tell."""
         bounds = [self._bound(hole) for hole in self.holes]
-        return None if None in bounds else sum(bound for bound in bounds if bound is not None)
+        return None if None in bounds else sum((bound for bound in bounds if bound is not None), 0.0)
 
     def _bound(self, hole: Hole) -> float | None:
         if hole is self._tail and self.flush_ns is not None and hole.from_ns is not None:

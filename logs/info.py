@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections import Counter, defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -95,7 +96,7 @@ def _duration_s(run: Run) -> float:
     return seconds(max(times) - min(times)) if times else 0.0
 
 
-def _channels(arrivals: tuple[tuple[int, Measurement], ...]) -> list[dict[str, Any]]:
+def _channels(arrivals: Sequence[tuple[int, Measurement]]) -> list[dict[str, Any]]:
     """One row per sensor: how much, how often, and what is odd about its times."""
     by_sensor: dict[tuple[str, str], list[tuple[int, int, int]]] = defaultdict(list)
     for log_ns, measurement in arrivals:

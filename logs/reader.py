@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -37,7 +38,7 @@ class Log(NamedTuple):
     """
 
     run: Run
-    arrivals: tuple[tuple[int, Measurement], ...]
+    arrivals: Sequence[tuple[int, Measurement]]
     damage: Damage | None
 
 
@@ -64,7 +65,7 @@ def read_log(path: Path) -> Log:
         warnings=(*walk.warnings, *_warnings(path, contents, world)),
         lanes={name: tuple(estimates) for name, estimates in contents.lanes.items()},
     )
-    return Log(run, tuple(contents.measurements), walk.damage)
+    return Log(run, contents.measurements, walk.damage)
 
 
 def _world(path: Path, contents: _Contents) -> World:

@@ -9,7 +9,6 @@ import zlib
 from collections.abc import Iterable
 from typing import IO
 
-from mcap.data_stream import RecordBuilder
 from mcap.records import (
     Attachment,
     AttachmentIndex,
@@ -29,7 +28,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from logs.salvage import MAGIC, Piece
+from logs.records import MAGIC, Piece, packed
 
 
 class Rebuilder:
@@ -70,19 +69,19 @@ class Rebuilder:
 
     def add_record(self, record: McapRecord) -> None:
         """Add a record that the damaged file did not have."""
-        self.add(Piece(_bytes(record), record, []))
+        self.add(Piece(packed(record), record, []))
 
     def finish(self) -> None:
         """Write the end of the data, the summary, the footer."""
-        self._stream.write(_bytes(DataEnd(0)))
+        self._stream.write(packed(DataEnd(0)))
         start = self._stream.tell()
         summary, offsets = b"", b""
         for group in self._groups():
-            packed = b"".join(map(_bytes, group))
-            if packed:
-                offsets += _bytes(SummaryOffset(packed[0], start + len(summary), len(packed)))
-            summary += packed
-        footer = _bytes(Footer(start, start + len(summary), 0))[:-4]
+            content = b"".join(map(packed, group))
+            if content:
+                offsets += packed(SummaryOffset(content[0], start + len(summary), len(content)))
+            summary += content
+        footer = packed(Footer(start, start + len(summary), 0))[:-4]
         checksum = zlib.crc32(summary + offsets + footer)
         self._stream.write(summary + offsets + footer + checksum.to_bytes(4, "little") + MAGIC)
 
@@ -105,7 +104,7 @@ class Rebuilder:
         offsets = {}
         for channel_id, index in indexes.items():
             offsets[channel_id] = self._stream.tell()
-            self._stream.write(_bytes(index))
+            self._stream.write(packed(index))
         times = [time_ns for index in indexes.values() for time_ns, _ in index.records]
         self._chunks.append(
             ChunkIndex(
@@ -136,9 +135,3 @@ class Rebuilder:
         )
         named = self._schemas.values(), self._channels.values()
         return (*named, [statistics], self._chunks, self._attachments, self._metadata)
-
-
-def _bytes(record: McapRecord) -> bytes:
-    builder = RecordBuilder()
-    record.write(builder)
-    return bytes(builder.end())  # type: ignore[no-untyped-call]  # mcap leaves it without annotation

@@ -63,7 +63,8 @@ def repair(broken: Path, good: Path, *, force: bool = False) -> Repaired:
         except OSError as error:
             raise LogError(f"{good}: cannot be written ({error}); choose another place, or free some space") from error
         finally:
-            unfinished.unlink(missing_ok=True)
+            with suppress(OSError):  # it is not there: renamed, or never made
+                unfinished.unlink()
     _sync(good.parent)
     return Repaired(broken, good, salvage.messages, salvage.damage)
 

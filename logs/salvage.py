@@ -10,76 +10,24 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from io import BytesIO
 from itertools import chain
-from typing import IO, NamedTuple
+from typing import IO
 
-from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import (
-    Attachment,
-    Channel,
-    Chunk,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    Message,
-    MessageIndex,
-    Metadata,
-    Schema,
-)
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Schema
 from mcap.summary import Summary
 
 from logs.damage import Damage, Hole
+from logs.records import HEAD, MAGIC, PARSERS, ExactStream, Piece, inside, packed, parse
 from logs.writer import FLUSH_NS, LIBRARY
 
-MAGIC = b"\x89MCAP0\r\n"
-HEAD = 1 + 8
-"""Bytes of the opcode and the length before every record."""
 DATA_END = HEAD + 4
 FOOTER = HEAD + 8 + 8 + 4
-PARSERS: Mapping[int, Callable[[ReadDataStream], McapRecord]] = {
-    Opcode.HEADER: Header.read,
-    Opcode.SCHEMA: Schema.read,
-    Opcode.CHANNEL: Channel.read,
-    Opcode.CHUNK: Chunk.read,
-    Opcode.MESSAGE_INDEX: MessageIndex.read,
-    Opcode.ATTACHMENT: Attachment.read,
-    Opcode.METADATA: Metadata.read,
-    Opcode.DATA_END: DataEnd.read,
-}
-"""Records that may stand before the index, but for messages, whose parser wants their length."""
-
-
-class Piece(NamedTuple):
-    """One sound record: its bytes as they stand in the file, and for a chunk the records in it, each with its offset
-    in the uncompressed chunk.
-    """
-
-    raw: bytes
-    record: McapRecord
-    inside: list[tuple[int, McapRecord]]
-
-    @property
-    def records(self) -> Iterable[McapRecord]:
-        """The record, or those in the chunk."""
-        return (record for _, record in self.inside) if isinstance(self.record, Chunk) else (self.record,)
-
-
-class ExactStream(ReadDataStream):
-    """A stream that raises `EndOfFile` where the library's would answer with fewer bytes than were asked for."""
-
-    def read(self, length: int) -> bytes:
-        """Exactly ``length`` bytes."""
-        data = super().read(length)
-        if len(data) < length:
-            raise EndOfFile
-        return data
+"""Bytes of these records, their heads included."""
 
 
 class Salvage:
@@ -150,13 +98,13 @@ class Salvage:
             raise EndOfFile
         self._stream.seek(at)
         raw = self._stream.read(end - at)
-        record = _parse(ExactStream(BytesIO(raw)))
+        record = parse(ExactStream(BytesIO(raw)))
         if isinstance(record, Attachment):
             _check(zlib.crc32(raw[HEAD:-4]), int.from_bytes(raw[-4:], "little"))
         if isinstance(record, Message) and self._is_chunked:
             # Writers use chunks or do not. Between chunks this is an index, one flipped bit away from a message.
             raise TypeError("a message stands between chunks")
-        return Piece(raw, record, list(_inside(record)) if isinstance(record, Chunk) else [])
+        return Piece(raw, record, list(inside(record)) if isinstance(record, Chunk) else [])
 
     def _absent(self, piece: Piece) -> list[Piece]:
         """Schemas and channels that a piece needs and only the index has; raises `KeyError` where nobody has them."""
@@ -166,7 +114,7 @@ class Salvage:
         def need_schema(channel: Channel) -> None:
             if channel.schema_id and channel.schema_id not in schemas:
                 schemas.add(channel.schema_id)
-                absent.append(_written(summary.schemas[channel.schema_id]))
+                absent.append(_repeated(summary.schemas[channel.schema_id]))
 
         for record in piece.records:
             if isinstance(record, Schema):
@@ -177,7 +125,7 @@ class Salvage:
             elif isinstance(record, Message) and record.channel_id not in channels:
                 need_schema(summary.channels[record.channel_id])
                 channels.add(record.channel_id)
-                absent.append(_written(summary.channels[record.channel_id]))
+                absent.append(_repeated(summary.channels[record.channel_id]))
         self._schemas, self._channels = schemas, channels
         return absent
 
@@ -231,29 +179,8 @@ class Salvage:
             self._holes.append(Hole(at, at, "the checksum of the whole differs", self._first_ns, self._last_ns))
 
 
-def _parse(stream: ReadDataStream) -> McapRecord:
-    """The record that ``stream`` stands at; raises where its kind, or a length in it, is wrong."""
-    opcode, length = stream.read1(), stream.read8()
-    start = stream.count
-    record = Message.read(stream, length) if opcode == Opcode.MESSAGE else PARSERS[opcode](stream)
-    if stream.count - start != length:
-        raise EndOfFile
-    return record
-
-
-def _inside(chunk: Chunk) -> Iterator[tuple[int, McapRecord]]:
-    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-    while stream.count < length:
-        offset, record = stream.count, _parse(stream)
-        if not isinstance(record, Schema | Channel | Message):
-            raise TypeError(f"a chunk holds a {type(record).__name__}")
-        yield offset, record
-
-
-def _written(record: Schema | Channel) -> Piece:
-    builder = RecordBuilder()
-    record.write(builder)
-    return Piece(bytes(builder.end()), record, [])  # type: ignore[no-untyped-call]  # mcap leaves it without annotation
+def _repeated(record: McapRecord) -> Piece:
+    return Piece(packed(record), record, [])
 
 
 def _check(actual: int, expected: int) -> None:

@@ -14,7 +14,8 @@ from mcap.records import Channel, Message, Metadata, Schema
 
 from fusion import LogError
 from logs.damage import Damage
-from logs.salvage import MAGIC, Salvage
+from logs.records import MAGIC
+from logs.salvage import Salvage
 
 REPAIR_RECORD = "fusion repair"
 """Name of the metadata record in which a repaired file says what it has lost."""
@@ -83,6 +84,9 @@ def open_mcap(path: Path) -> IO[bytes]:
         stream = path.open("rb")
     except OSError as error:
         raise LogError(f"{path}: cannot be opened ({error.strerror}); check the path") from error
+    if not stream.seekable():
+        stream.close()
+        raise LogError(f"{path}: is a pipe, and a log is read from more than one place; give a file")
     start = stream.read(len(MAGIC))
     stream.seek(0)
     if start != MAGIC:

@@ -21,8 +21,9 @@ from mcap.writer import CompressionType, IndexType, Writer
 from fusion import Gyro, LogError, World
 from fusion.cli import main
 from logs.reader import read_run
+from logs.records import HEAD, MAGIC
 from logs.repair import mend, repair
-from logs.salvage import HEAD, MAGIC, Salvage
+from logs.salvage import Salvage
 from logs.writer import RunWriter
 
 SECOND = 1_000_000_000
@@ -350,6 +351,13 @@ def test_command_tells_what_was_kept_and_lost_in_words_and_as_json(tmp_path, cap
     assert about["messages_kept"] == len(read_run(good).measurements)
 
 
+def test_pipe_is_refused(tmp_path):
+    shell = f"cat {write_mcap(tmp_path / 'run.mcap')} | {sys.executable} -m fusion.cli info /dev/stdin"
+    done = subprocess.run(["sh", "-c", shell], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert "give a file" in done.stderr
+
+
 @pytest.mark.parametrize("content", [b"", MAGIC[:7], b"hello, this is no MCAP"])
 def test_what_is_no_mcap_file_is_refused(tmp_path, content, capsys):
     (tmp_path / "run.mcap").write_bytes(content)
@@ -372,8 +380,9 @@ def test_broken_file_is_never_written_to_and_another_only_if_asked(tmp_path):
     assert (path.read_bytes(), other.read_text()) == (before, "mine")
     with pytest.raises(LogError, match="exists already"):
         repair(path, tmp_path, force=True)
-    with pytest.raises(LogError, match="choose another place"):
-        repair(path, tmp_path / "nowhere" / "good.mcap")
+    for nowhere in (tmp_path / "nowhere" / "good.mcap", path / "good.mcap"):
+        with pytest.raises(LogError, match="choose another place"):
+            repair(path, nowhere)
     assert main(["repair", str(path), "-o", str(other), "--force"]) == 3
     assert seen(other) == list(range(20))
 
