@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, TypeAlias
 
+from logs.timing import GAP_PERIODS
+
 Facts: TypeAlias = Mapping[str, Any]
 """Plain values, as `logs.info.describe` answers them."""
 
@@ -58,7 +60,7 @@ def _oddities(row: Facts) -> Iterator[str]:
     at = f" at {row['longest_gap_at_s']:.1f} s" if row["gaps"] else ""
     yield f"longest gap {row['longest_gap_s']:.2f} s{at}"
     if row["gaps"]:
-        yield f"{row['gaps']} gaps of over 3 periods"
+        yield f"gaps of over {GAP_PERIODS} periods: {row['gaps']}"
     if row["out_of_order"]:
         yield f"{row['out_of_order']} out of order"
     if row["duplicates"]:
@@ -70,7 +72,7 @@ def _oddities(row: Facts) -> Iterator[str]:
     if len(row["clock_jumps"]) > 3:
         yield f"{len(row['clock_jumps'])} clock jumps in all"
     if row["log_time_backwards"]:
-        yield f"log time runs backwards {row['log_time_backwards']} times"
+        yield f"times that the log time runs backwards: {row['log_time_backwards']}"
 
 
 def _start(about: Facts) -> str:

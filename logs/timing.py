@@ -39,16 +39,16 @@ class Stream(NamedTuple):
         return {
             "count": len(ordered),
             "rate_hz": (len(ordered) - 1) / span_s if span_s > 0.0 else None,
-            "period_s": period_ns * 1e-9,
+            "period_s": seconds(round(period_ns)),
             "longest_gap_s": seconds(int(gaps[longest])) if len(gaps) else 0.0,
             "longest_gap_at_s": seconds(int(ordered[longest]) - start_ns),
             "gaps": int(np.sum(gaps > GAP_PERIODS * period_ns)) if period_ns > 0.0 else 0,
             "out_of_order": int(np.sum(np.diff(arrived) < 0)),
             "duplicates": len(ordered) - len(np.unique(np.stack([self.stamps, self.numbers]), axis=1).T),
-            "late_s": float(np.median(self._late)) * 1e-9,
+            "late_s": seconds(round(float(np.median(self._late)))),
             "latest_s": seconds(int(self._late.max())),
             "clock_jumps": [
-                {"at_s": seconds(int(self.stamps[i]) - start_ns), "by_s": by_ns * 1e-9} for i, by_ns in self.jumps()
+                {"at_s": seconds(int(self.stamps[i]) - start_ns), "by_s": seconds(by_ns)} for i, by_ns in self.jumps()
             ],
             "log_time_backwards": int(np.sum(np.diff(self.arrivals) < 0)),
         }
@@ -58,7 +58,7 @@ class Stream(NamedTuple):
         """Delay of each message [ns]."""
         return self.arrivals - self.stamps
 
-    def jumps(self) -> list[tuple[int, float]]:
+    def jumps(self) -> list[tuple[int, int]]:
         """Where the delay changes for good: the first message after it, and by how much [ns]."""
         if len(self.stamps) < 2 * JUMP_MESSAGES:
             return []
@@ -66,4 +66,4 @@ class Stream(NamedTuple):
         before, after = windows[:-JUMP_MESSAGES], windows[JUMP_MESSAGES:]
         up, down = after.min(axis=1) - before.max(axis=1), before.min(axis=1) - after.max(axis=1)
         places = np.flatnonzero(np.maximum(up, down) >= JUMP_NS)
-        return [(int(i) + JUMP_MESSAGES, float(np.median(after[i]) - np.median(before[i]))) for i in places]
+        return [(int(i) + JUMP_MESSAGES, round(float(np.median(after[i]) - np.median(before[i])))) for i in places]

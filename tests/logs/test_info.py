@@ -157,12 +157,21 @@ def test_gaps_are_counted_and_placed_and_twins_are_told():
     assert (timing["longest_gap_s"], timing["longest_gap_at_s"]) == (8e-9, 12e-9)
 
 
-def test_log_time_that_runs_backwards_is_counted(tmp_path):
-    with RunWriter(tmp_path / "run.mcap", WORLD, name="back") as writer:
-        for number, log_s in enumerate((5, 6, 7, 2, 3)):
-            writer.write(Gyro(number * SECOND, "g", number, 0.0), log_time_ns=log_s * SECOND)
-    (gyro,) = describe(tmp_path / "run.mcap")["channels"]
+def test_clock_of_the_recorder_that_is_set_back_is_told_in_words(tmp_path, capsys):
+    """It arrives a second late each time; the log time is set back by 15 s before number 20, and number 30 is lost."""
+    path = tmp_path / "run.mcap"
+    with RunWriter(path, WORLD, name="back") as writer:
+        for number in (*range(30), *range(34, 50), 49):
+            log_s = 31 + number - (15 if number >= 20 else 0)
+            writer.write(Gyro((30 + number) * SECOND, "g", number, 0.0), log_time_ns=log_s * SECOND)
+    (gyro,) = describe(path)["channels"]
+    assert gyro["clock_jumps"] == [{"at_s": 20.0, "by_s": -15.0}]
     assert gyro["log_time_backwards"] == 1
+    assert main(["info", str(path)]) == 0
+    text = capsys.readouterr().out
+    assert "longest gap 5.00 s at 29.0 s, gaps of over 3 periods: 1, " in text
+    assert ", 1 twice, " in text
+    assert "clock jump at 20.0 s: its delay changes by -15.00 s, times that the log time runs backwards: 1" in text
 
 
 ANCHORED = World.from_table(
