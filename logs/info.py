@@ -1,21 +1,26 @@
-"""`fusion info`: what is in a log, and whether anything is wrong with it."""
+"""`fusion info`: what is in a log, whether anything is wrong with it, and which estimators could use it."""
 
 from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
-from collections import defaultdict
-from itertools import pairwise
+from collections import Counter, defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from fusion import FusionError, Measurement, Ranges, WifiScan
 from fusion.values import seconds
 from logs.bag import open_bag
-from logs.reader import holds_run, read_run
+from logs.info_text import info_text
+from logs.reader import holds_run, read_log
 from logs.roles import roles_of
 from logs.run import Run
+from logs.timing import Stream
+from logs.usability import usability
 
 
 def describe(path: Path) -> dict[str, Any]:
@@ -25,21 +30,24 @@ def describe(path: Path) -> dict[str, Any]:
     """
     if path.is_dir() or not holds_run(path):
         return _describe_bag(path)
-    run = read_run(path)
+    log = read_log(path)
+    run = log.run
     return {
         "path": str(path),
         "name": run.name,
         "world": run.world.name,
         "world_hash": run.world.hash,
-        "anchors": [anchor.id for anchor in run.world.anchors],
+        **_anchors(run),
         "duration_s": _duration_s(run),
-        "channels": _channels(run),
+        "channels": _channels(log.arrivals),
         "truth": 0 if run.truth is None else len(run.truth),
         "prior": None if run.prior is None else [*run.prior.pose],
         "position_known": run.prior is not None and run.prior.position_known,
         "heading_known": run.prior is not None and run.prior.heading_known,
         "estimators": {name: len(estimates) for name, estimates in run.lanes.items()},
+        "usability": [verdict.record() for verdict in usability(run)],
         "metadata": dict(run.metadata),
+        "damage": log.damage.record() if log.damage is not None and str(log.damage) else None,
         "warnings": list(run.warnings),
     }
 
@@ -71,87 +79,52 @@ def _describe_bag(path: Path) -> dict[str, Any]:
     }
 
 
+def _anchors(run: Run) -> dict[str, Any]:
+    """The anchors of the world, and the readings of each anchor that was heard, known or not."""
+    scans = (measurement for measurement in run.measurements if isinstance(measurement, WifiScan | Ranges))
+    heard = Counter(reading.anchor for scan in scans for reading in scan.readings)
+    known = [anchor.id for anchor in run.world.anchors]
+    return {
+        "anchors": known,
+        "readings": {anchor: heard[anchor] for anchor in known},
+        "unknown_anchors": {anchor: heard[anchor] for anchor in sorted(heard.keys() - set(known))},
+    }
+
+
 def _duration_s(run: Run) -> float:
     times = [measurement.time_ns for measurement in run.measurements]
     return seconds(max(times) - min(times)) if times else 0.0
 
 
-def _channels(run: Run) -> list[dict[str, Any]]:
-    """One row per sensor: how much, how often, the longest gap, and stamps that ran backwards."""
-    by_sensor: dict[tuple[str, str], list[int]] = defaultdict(list)
-    for measurement in run.measurements:
-        by_sensor[type(measurement).__name__, measurement.sensor].append(measurement.time_ns)
-    rows = []
-    for (kind, sensor), times in sorted(by_sensor.items()):
-        span_s = seconds(max(times) - min(times))
-        gaps = [later - earlier for earlier, later in pairwise(sorted(times))]
-        rows.append(
-            {
-                "kind": kind,
-                "sensor": sensor,
-                "count": len(times),
-                "rate_hz": (len(times) - 1) / span_s if span_s > 0.0 else None,
-                "longest_gap_s": seconds(max(gaps, default=0)),
-                "out_of_order": sum(later < earlier for earlier, later in pairwise(times)),
-            }
-        )
-    return rows
-
-
-def _rate(rate_hz: float | None) -> str:
-    return "once" if rate_hz is None else f"{rate_hz:.2f} Hz"
-
-
-def _bag_text(about: dict[str, Any]) -> str:
-    """A foreign bag for a reader: a line per topic, and what it could be."""
-    lines = [f"{about['name']}: a bag of {about['duration_s']:.1f} s, not a log of fusion"]
-    width = max((len(row["topic"]) for row in about["topics"]), default=0)
-    for row in about["topics"]:
-        could = f"  could be {' or '.join(row['roles'])}" if row["roles"] else ""
-        names = f" ({', '.join(row['names'])})" if row["names"] else ""
-        bad = f", {row['undecodable']} cannot be decoded" if row["undecodable"] else ""
-        rate = _rate(row["rate_hz"]) if row["count"] else "empty"
-        lines.append(f"  {row['topic']:<{width}} {row['count']:>7}  {rate:>10}  {row['type']}{bad}{could}{names}")
-        lines += [f"    {row['missing']}"] if row["missing"] else []
-    lines.append("bring it in: fusion import rosbag BAG --world WORLD.toml --topic ROLE=TOPIC ... -o OUT.mcap")
-    lines += [f"warning: {warning}" for warning in about["warnings"]]
-    return "\n".join(lines) + "\n"
-
-
-def _text(about: dict[str, Any]) -> str:
-    """The same for a reader."""
-    if "topics" in about:
-        return _bag_text(about)
-    lines = [
-        f"{about['name']}: {about['duration_s']:.1f} s in the world {about['world']!r} ({about['world_hash'][:12]})"
+def _channels(arrivals: Sequence[tuple[int, Measurement]]) -> list[dict[str, Any]]:
+    """One row per sensor: how much, how often, and what is odd about its times."""
+    by_sensor: dict[tuple[str, str], list[tuple[int, int, int]]] = defaultdict(list)
+    for log_ns, measurement in arrivals:
+        row = (measurement.time_ns, log_ns, measurement.seq)
+        by_sensor[type(measurement).__name__, measurement.sensor].append(row)
+    start_ns = min((measurement.time_ns for _, measurement in arrivals), default=0)
+    return [
+        {"kind": kind, "sensor": sensor, **Stream(*np.array(rows, dtype=np.int64).T).timing(start_ns)}
+        for (kind, sensor), rows in sorted(by_sensor.items())
     ]
-    lines.append(f"anchors: {', '.join(about['anchors']) or 'none'}")
-    for row in about["channels"]:
-        rate = _rate(row["rate_hz"])
-        late = f", {row['out_of_order']} out of order" if row["out_of_order"] else ""
-        gap = f"longest gap {row['longest_gap_s']:.2f} s"
-        lines.append(f"  {row['kind']:<12} {row['sensor']:<12} {row['count']:>7}  {rate:>10}  {gap}{late}")
-    lines.append(f"truth: {about['truth']} poses" if about["truth"] else "truth: none, so errors cannot be scored")
-    if about["prior"] is None:
-        lines.append("start: none in the log")
-    else:
-        x, y, heading = about["prior"]
-        turned = f"{math.degrees(heading):.1f}°" if about["heading_known"] else "unknown"
-        place = f"x {x:.2f} m, y {y:.2f} m" if about["position_known"] else "position unknown"
-        lines.append(f"start: {place}, heading {turned}")
-    lines += [f"estimates of {name}: {count}" for name, count in about["estimators"].items()]
-    lines += [f"warning: {warning}" for warning in about["warnings"]]
-    return "\n".join(lines) + "\n"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Arguments of `fusion info`."""
-    parser.add_argument("run", metavar="RUN", type=Path, help="the log, or a bag of another robot")
-    parser.add_argument("--json", action="store_true", help="as JSON")
+    parser.add_argument("runs", metavar="RUN", type=Path, nargs="+", help="a log, or a bag of another robot")
+    parser.add_argument("--json", action="store_true", help="as JSON: an object, or a list of them for several files")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Tell what is in the log."""
-    about = describe(arguments.run)
-    sys.stdout.write(json.dumps(about, indent=2) + "\n" if arguments.json else _text(about))
-    return 0
+    """Tell what is in each log; one that cannot be read does not keep the others from being told."""
+    told = []
+    for path in arguments.runs:
+        try:
+            told.append(describe(path))
+        except FusionError as error:
+            sys.stderr.write(f"fusion info: {error}\n")
+    if not arguments.json:
+        sys.stdout.write("\n".join(map(info_text, told)))
+    elif told or len(arguments.runs) > 1:
+        sys.stdout.write(json.dumps(told if len(arguments.runs) > 1 else told[0], indent=2) + "\n")
+    return int(len(told) < len(arguments.runs))

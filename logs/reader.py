@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from mcap.records import Message
 
 from fusion import Estimate, FusionError, LogError, Measurement, Prior, Remark, Truth, World
 from logs import device_messages, messages
+from logs.damage import Damage
 from logs.device_messages import ClockSync
 from logs.messages import DECODERS, ESTIMATE_TOPIC, FATES_TOPIC
 from logs.run import Run, TruthTrack
@@ -32,27 +35,42 @@ class _Contents:
     foreign: dict[str, int] = field(default_factory=dict)
 
 
+class Log(NamedTuple):
+    """A run, and what only the file it came from tells: the measurements in the order they stand there, each after
+    its log time [ns], and what is damaged.
+    """
+
+    run: Run
+    arrivals: Sequence[tuple[int, Measurement]]
+    damage: Damage | None
+
+
 def read_run(path: Path) -> Run:
     """The run in the log at ``path``; raises `LogError` for a file that holds none."""
+    return read_log(path).run
+
+
+def read_log(path: Path) -> Log:
+    """The run in the log at ``path``, and more about the file; raises `LogError` for a file that holds none."""
     walk = Walk(path)
     contents = _contents(walk)
     world = _world(path, contents)
     if not (contents.measurements or contents.truths or contents.lanes or contents.clocks or contents.prior):
         raise LogError(f"{path}: holds no messages, or none that can be read; record or import it again")
-    contents.measurements.sort(key=lambda item: item[0])
-    return Run(
+    run = Run(
         path=path,
         name=contents.record.get("name", path.stem),
         world=world,
         prior=contents.prior,
         metadata={key: value for key, value in contents.record.items() if key != "world"},
-        measurements=tuple(measurement for _, measurement in contents.measurements),
+        measurements=tuple(item[1] for item in sorted(contents.measurements, key=lambda item: item[0])),
         truth=TruthTrack.from_truths(contents.truths) if contents.truths else None,
         warnings=(*walk.warnings, *_warnings(path, contents, world)),
         lanes={name: tuple(estimates) for name, estimates in contents.lanes.items()},
         remarks=tuple(contents.remarks),
         clocks=tuple(contents.clocks),
     )
+    return Log(run, contents.measurements, walk.damage)
 
 
 def _world(path: Path, contents: _Contents) -> World:

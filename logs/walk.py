@@ -1,8 +1,7 @@
-"""One walk over an MCAP file, whole or cut short: ours, or anybody's.
+"""One walk over the messages of an MCAP file, whole or damaged: ours, or anybody's.
 
-A file that a crash cut off opens all the same: everything up to the last closed chunk is there, and a warning says
-what is missing. The package's own message iterators answer such a file with nothing at all, hence the walk over raw
-records.
+A file that a crash cut off opens all the same, and so does one with a damaged chunk in the middle: what is sound is
+there, and a warning says what is missing. The package's own message iterators answer such a file with nothing at all.
 """
 
 from __future__ import annotations
@@ -12,11 +11,14 @@ from pathlib import Path
 from typing import IO, NamedTuple
 
 from mcap.records import Channel, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
 
 from fusion import LogError
+from logs.damage import Damage
+from logs.records import MAGIC
+from logs.salvage import Salvage
 
-MAGIC = b"\x89MCAP0\r\n"
+REPAIR_RECORD = "fusion repair"
+"""Name of the metadata record in which a repaired file says what it has lost."""
 
 
 class Source(NamedTuple):
@@ -33,41 +35,41 @@ class Source(NamedTuple):
 class Walk:
     """The messages of a file in the order they stand in it, for one iteration.
 
-    ``sources``, ``metadata`` (records by name) and ``damage`` grow as the walk goes on; ``damage`` stays empty for a
-    file that is whole. Raises `LogError`, on iteration, for a file that cannot be opened or is no MCAP.
+    ``sources`` and ``metadata`` (records by name) grow as the walk goes on; ``damage`` is there after it. Raises
+    `LogError`, on iteration, for a file that cannot be opened or is no MCAP.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.sources: dict[int, Source] = {}
         self.metadata: dict[str, dict[str, str]] = {}
-        self.damage = ""
+        self.damage: Damage | None = None
 
     def __iter__(self) -> Iterator[tuple[Source, Message]]:
-        with _open(self.path) as stream:
-            size = self.path.stat().st_size
-            readable = len(MAGIC)
+        with open_mcap(self.path) as stream:
             schemas: dict[int, Schema] = {}
-            try:
-                for record in StreamReader(stream, validate_crcs=True, record_size_limit=size).records:
-                    readable = stream.tell()
-                    if isinstance(record, Message):
-                        yield self.sources[record.channel_id], record
-                    elif isinstance(record, Schema):
-                        schemas[record.id] = record
-                    elif isinstance(record, Channel):
-                        self.sources[record.id] = _source(record, schemas.get(record.schema_id))
-                    elif isinstance(record, Metadata):
-                        self.metadata.setdefault(record.name, {}).update(record.metadata)
-            except Exception as error:  # noqa: BLE001 - damage shows in any of a dozen ways: "nothing further"
-                self.damage = f"the last {size - readable} of its {size} bytes ({type(error).__name__})"
+            salvage = Salvage(stream)
+            for record in (record for piece in salvage for record in piece.records):
+                if isinstance(record, Message):
+                    yield self.sources[record.channel_id], record
+                elif isinstance(record, Schema):
+                    schemas[record.id] = record
+                elif isinstance(record, Channel):
+                    self.sources[record.id] = _source(record, schemas.get(record.schema_id))
+                elif isinstance(record, Metadata):
+                    self.metadata.setdefault(record.name, {}).update(record.metadata)
+            self.damage = salvage.damage
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the walk could not read, in a sentence; empty for a file that is whole."""
-        if not self.damage:
-            return ()
-        return (f"{self.path}: cut off or damaged, {self.damage} cannot be read; what stands before is used",)
+        """What the walk could not read and what a repair could not, a sentence each; empty for a file that is whole."""
+        told = []
+        if lost := self.metadata.get(REPAIR_RECORD, {}).get("lost"):
+            told.append(f"{self.path}: was repaired; it had been {lost}")
+        if self.damage and str(self.damage):
+            remedy = f"`fusion repair {self.path} -o GOOD.mcap` makes a whole file of the rest"
+            told.append(f"{self.path}: {self.damage}; {remedy}")
+        return tuple(told)
 
 
 def _source(channel: Channel, schema: Schema | None) -> Source:
@@ -76,11 +78,15 @@ def _source(channel: Channel, schema: Schema | None) -> Source:
     return Source(channel.topic, schema.name, channel.message_encoding, schema.data)
 
 
-def _open(path: Path) -> IO[bytes]:
+def open_mcap(path: Path) -> IO[bytes]:
+    """The file, open for reading; raises `LogError` for one that cannot be opened or is no MCAP."""
     try:
         stream = path.open("rb")
     except OSError as error:
         raise LogError(f"{path}: cannot be opened ({error.strerror}); check the path") from error
+    if not stream.seekable():
+        stream.close()
+        raise LogError(f"{path}: is a pipe, and a log is read from more than one place; give a file")
     start = stream.read(len(MAGIC))
     stream.seek(0)
     if start != MAGIC:

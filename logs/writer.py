@@ -28,8 +28,12 @@ from logs.messages import ESTIMATE_TOPIC, FATES_TOPIC, KINDS, SCHEMAS
 
 RUN_RECORD = "fusion"
 """Name of the metadata record that makes an MCAP file one of ours."""
+LIBRARY = "fusion"
+"""What the header of a log says of its writer."""
+LOSS_NS = nanoseconds(1.0)
+"""What a crash may cost, by the stamps of a log."""
 FLUSH_NS = nanoseconds(0.9)
-"""A little less than the second that a crash may cost, since what is received must still be written."""
+"""A little less than that, since what is received must still be written."""
 SYNC_S = 0.8
 """Less than a flush is apart from the next, so that every one of a live recording is synced."""
 FATES = "fusion_msgs/msg/Fates"
@@ -57,7 +61,7 @@ class RunWriter:
             raise LogError(f"{path}: cannot be written ({error}); choose another place") from error
         self._path = path
         self._writer = Writer(self._stream)
-        self._writer.start(profile="ros2", library="fusion")
+        self._writer.start(profile="ros2", library=LIBRARY)
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._flushed_ns: int | None = None

@@ -121,7 +121,8 @@ def test_damaged_byte_never_changes_a_value_unnoticed(tmp_path):
             run = read_run(damaged)
         except LogError:
             continue
-        assert run.measurements == tuple(ten_seconds()[: len(run.measurements)])
+        written_ones = iter(ten_seconds())
+        assert all(measurement in written_ones for measurement in run.measurements)  # none changed, all in order
         assert len(run.measurements) == 200 or run.warnings
 
 
