@@ -1,13 +1,17 @@
 """Bring the kernel and the guest programs: downloaded by apt under their package names, unpacked, never installed.
 
-Run as ``python -m kernel.fetch``. Needs a Debian whose apt knows its archive; no root, except for apt's own lists.
+Run as ``python -m kernel.fetch`` on a Debian. Needs no root: apt's lists are fetched anew into a folder of our own,
+from the archives that this host's apt knows; its own lists may be absent, and stay as they are.
 """
 
 from __future__ import annotations
 
+import platform
+import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from kernel.machine import Machine, MachineMissingError, cache, find, tool
@@ -18,44 +22,63 @@ OLDEST_KERNEL = (6, 4)
 
 
 class Apt:
-    """apt as this host has it set up or, given a `folder`, with that folder's sources and lists instead."""
+    """apt with lists of its own in `folder`, of the archives that this host's apt knows for this Debian release."""
 
-    def __init__(self, folder: Path | None = None) -> None:
-        self.options = () if folder is None else _private(folder)
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        for name in ("lists/partial", "archives/partial"):
+            (folder / name).mkdir(parents=True)
+        self._options: tuple[str, ...] = ()
+        self._codename = platform.freedesktop_os_release().get("VERSION_CODENAME", "")
+        self._sources = list(self._known())
+        self._options = (
+            *("-o", f"Dir::Etc::sourcelist={folder / 'sources.list'}"),
+            *("-o", "Dir::Etc::sourceparts=/dev/null"),
+            *("-o", f"Dir::State::lists={folder / 'lists'}"),
+            *("-o", f"Dir::Cache={folder}"),
+        )
+        self._update()
 
-    def ask(self, program: str, *arguments: str, cwd: Path | None = None) -> str:
-        """The output of one apt program."""
-        command = [tool(program), *self.options, *arguments]
+    def _known(self) -> Iterator[tuple[str, str]]:
+        """Each archive's address and suite, such as bookworm and bookworm-security."""
+        planned = self._ask("apt-get", "update", "--print-uris")
+        for site, suite in re.findall(r"'(\S+)/dists/(\S+)/InRelease'", planned):
+            if suite.partition("-")[0] == self._codename:
+                yield site, suite
+
+    def _update(self) -> None:
+        lines = [f"deb {site} {suite} main\n" for site, suite in self._sources]
+        (self._folder / "sources.list").write_text("".join(lines))
+        self._ask("apt-get", "-q", "update")
+
+    def add_backports(self) -> None:
+        """Know this release's backports too, and prefer them."""
+        suite = f"{self._codename}-backports"
+        self._sources += [(site, suite) for site, known in self._sources if known == self._codename]
+        self._options += ("-o", f"APT::Default-Release={suite}")
+        self._update()
+
+    def kernel_package(self) -> str:
+        """What Debian's kernel metapackage stands for now, such as linux-image-6.12.95+deb12-amd64."""
+        for line in self._ask("apt-cache", "depends", "linux-image-amd64").splitlines():
+            if line.strip().startswith("Depends: linux-image-"):
+                return line.split()[-1]
+        raise MachineMissingError("apt knows no linux-image-amd64 here: this tier needs a Debian on x86-64")
+
+    def unpack(self, packages: tuple[str, ...], target: Path) -> None:
+        """Download `packages` and unpack them all into `target`."""
+        downloads = self._folder / target.name
+        downloads.mkdir()
+        self._ask("apt-get", "-q", "download", *packages, cwd=downloads)
+        for package in sorted(downloads.glob("*.deb")):
+            subprocess.run([tool("dpkg-deb"), "-x", package, target], check=True)
+
+    def _ask(self, program: str, *arguments: str, cwd: Path | None = None) -> str:
+        command = [tool(program), *self._options, *arguments]
         ran = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
         if ran.returncode != 0:
             raise MachineMissingError(f"{' '.join(command)} failed: {ran.stderr.strip()}")
         return ran.stdout
-
-    def kernel_package(self) -> str:
-        """What Debian's kernel metapackage stands for now, such as linux-image-6.12.95+deb12-amd64."""
-        for line in self.ask("apt-cache", "depends", "linux-image-amd64").splitlines():
-            if line.strip().startswith("Depends: linux-image-"):
-                return line.split()[-1]
-        raise MachineMissingError("apt knows no linux-image-amd64: run apt-get update; the host must be a Debian")
-
-    def unpack(self, packages: tuple[str, ...], target: Path) -> None:
-        """Download `packages` and unpack them all into `target`."""
-        with tempfile.TemporaryDirectory() as downloads:
-            self.ask("apt-get", "-q", "download", *packages, cwd=Path(downloads))
-            for package in sorted(Path(downloads).glob("*.deb")):
-                subprocess.run([tool("dpkg-deb"), "-x", package, target], check=True)
-
-
-def _private(folder: Path) -> tuple[str, ...]:
-    for name in ("lists/partial", "archives/partial"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
-    settings = {
-        "Dir::Etc::sourcelist": folder / "backports.list",
-        "Dir::Etc::sourceparts": "/dev/null",
-        "Dir::State::lists": folder / "lists",
-        "Dir::Cache": folder,
-    }
-    return tuple(word for name, value in settings.items() for word in ("-o", f"{name}={value}"))
 
 
 def version_of(package: str) -> tuple[int, int]:
@@ -68,42 +91,36 @@ def version_of(package: str) -> tuple[int, int]:
     return int(major), int(minor)
 
 
-def backports(folder: Path) -> Apt:
-    """The same archive's backports, in lists of our own: the host's apt stays as it is."""
-    fields = "$(REPO_URI) $(CODENAME) $(COMPONENT)"
-    known = Apt().ask("apt-get", "indextargets", "--format", fields, "Created-By: Packages", "Label: Debian")
-    for site, suite, component in (line.split() for line in known.splitlines()):
-        if component == "main" and "-" not in suite:
-            apt = Apt(folder)
-            (folder / "backports.list").write_text(f"deb {site} {suite}-backports main\n")
-            apt.ask("apt-get", "-q", "update")
-            return apt
-    raise MachineMissingError("apt has no Debian archive in its sources, so no kernel can be had from it")
-
-
-def _fetch_kernel(scratch: Path) -> None:
-    apt = Apt()
+def unpack_kernel(apt: Apt, target: Path) -> None:
+    """Debian's kernel, from backports if this release's own is too old."""
     package = apt.kernel_package()
     if version_of(package) < OLDEST_KERNEL:
-        apt = backports(scratch / "apt")
+        apt.add_backports()
         package = apt.kernel_package()
     print(f"kernel tier: unpacking {package}")
-    apt.unpack((package,), scratch / "kernel")
-    release = package.removeprefix("linux-image-")
-    subprocess.run([tool("depmod"), "-b", scratch / "kernel", release], check=True)
+    apt.unpack((package,), target)
+    # The package ships no modules.dep: its installation would write it.
+    subprocess.run([tool("depmod"), "-b", target, package.removeprefix("linux-image-")], check=True)
+
+
+def unpack_programs(apt: Apt, target: Path) -> None:
+    """What runs in the guest beside Python."""
+    apt.unpack(PROGRAMS, target)
+
+
+PARTS = {"programs": unpack_programs, "kernel": unpack_kernel}
 
 
 def fetch() -> Machine:
-    """The machine, its missing parts brought first."""
-    cache().mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=cache()) as folder:
-        scratch = Path(folder)
-        if not (cache() / "kernel").is_dir():
-            _fetch_kernel(scratch)
-            (scratch / "kernel").rename(cache() / "kernel")
-        if not (cache() / "programs").is_dir():
-            Apt().unpack(PROGRAMS, scratch / "programs")
-            (scratch / "programs").rename(cache() / "programs")
+    """The machine; parts that are missing are brought first, each whole or not at all."""
+    missing = [name for name in PARTS if not (cache() / name).is_dir()]
+    if missing:
+        cache().mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=cache()) as scratch:
+            apt = Apt(Path(scratch, "apt"))
+            for name in missing:
+                PARTS[name](apt, Path(scratch, name))
+                Path(scratch, name).rename(cache() / name)
     return find()
 
 

@@ -64,7 +64,8 @@ def tool(name: str) -> str:
     """The path of a program of the host; administrators' folders count, though a user's PATH may lack them."""
     found = shutil.which(name, path=os.environ.get("PATH", "") + ":/usr/sbin:/sbin")
     if found is None:
-        raise MachineMissingError(f"{name} is not installed: apt-get install {' '.join(HOST_TOOLS.values())}")
+        remedy = f"apt-get install {' '.join(HOST_TOOLS.values())}" if name in HOST_TOOLS else "this needs a Debian"
+        raise MachineMissingError(f"{name} is not installed: {remedy}")
     return found
 
 
