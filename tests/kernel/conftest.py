@@ -24,6 +24,13 @@ def first_files(machine, tmp_path_factory):
 
 
 @pytest.fixture
+def gpio(machine):
+    """For tests that need simulated GPIO lines: they skip where those could not be built."""
+    if machine.without_gpio:
+        pytest.skip(f"kernel tier: {machine.without_gpio}")
+
+
+@pytest.fixture
 def run_job(machine, first_files, tmp_path):
     """``run_job(name, **arguments)``: boots a guest for that job alone, returns its `boot.Result`."""
 

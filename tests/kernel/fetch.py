@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from kernel import simulated_gpio
 from kernel.machine import Machine, MachineMissingError, cache, find, tool
 
 PROGRAMS = ("hostapd", "iw", "libnl-3-200", "libnl-genl-3-200", "libnl-route-3-200")
@@ -58,9 +59,13 @@ class Apt:
         self._options += ("-o", f"APT::Default-Release={suite}")
         self._update()
 
+    def depends(self, package: str) -> str:
+        """What `package` depends on, as apt says it."""
+        return self._ask("apt-cache", "depends", package)
+
     def kernel_package(self) -> str:
         """What Debian's kernel metapackage stands for now, such as linux-image-6.12.95+deb12-amd64."""
-        for line in self._ask("apt-cache", "depends", "linux-image-amd64").splitlines():
+        for line in self.depends("linux-image-amd64").splitlines():
             if line.strip().startswith("Depends: linux-image-"):
                 return line.split()[-1]
         raise MachineMissingError("apt knows no linux-image-amd64 here: this tier needs a Debian on x86-64")
@@ -99,8 +104,27 @@ def unpack_kernel(apt: Apt, target: Path) -> None:
         package = apt.kernel_package()
     print(f"kernel tier: unpacking {package}")
     apt.unpack((package,), target)
+    release = package.removeprefix("linux-image-")
+    try:
+        _add_gpio(apt, release, target)
+    except MachineMissingError as missing:
+        (target / "without-gpio").write_text(f"gpio-sim could not be built: {missing}")
+        print(f"kernel tier: gpio-sim could not be built: {missing}")
     # The package ships no modules.dep: its installation would write it.
-    subprocess.run([tool("depmod"), "-b", target, package.removeprefix("linux-image-")], check=True)
+    subprocess.run([tool("depmod"), "-b", target, release], check=True)
+
+
+def _add_gpio(apt: Apt, release: str, kernel: Path) -> None:
+    """The one simulated device that Debian's kernel lacks."""
+    major, minor = version_of(release)
+    headers, source, workshop = (kernel.parent / name for name in ("headers", "source", "workshop"))
+    package = f"linux-headers-{release}"
+    apt.unpack((package, *simulated_gpio.headers_wanted(apt.depends(package))), headers)
+    apt.unpack((f"linux-source-{major}.{minor}",), source)
+    module = simulated_gpio.build(headers, source, release, workshop)
+    extra = kernel / "lib" / "modules" / release / "extra"
+    extra.mkdir()
+    module.rename(extra / module.name)
 
 
 def unpack_programs(apt: Apt, target: Path) -> None:

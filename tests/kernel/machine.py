@@ -15,6 +15,9 @@ HOST_TOOLS = {
 }
 """Programs of the host, and the Debian package of each."""
 
+GPIO_MODULE = "simulated_gpio"
+"""The kernel's gpio-sim, built by `simulated_gpio`; under another name, so that it cannot be taken for the original."""
+
 HOW_TO_FETCH = "run make kernel-parts"
 
 
@@ -53,6 +56,12 @@ class Machine:
     def modules(self) -> Path:
         """The folder with modules.dep."""
         return next((self.kernel / "lib" / "modules").iterdir())
+
+    @property
+    def without_gpio(self) -> str | None:
+        """Why there is no simulated GPIO; None where there is."""
+        reason = self.kernel / "without-gpio"
+        return reason.read_text() if reason.is_file() else None
 
 
 def cache() -> Path:
