@@ -18,6 +18,9 @@ HOST_TOOLS = {
 GPIO_MODULE = "simulated_gpio"
 """The kernel's gpio-sim, built by `simulated_gpio`; under another name, so that it cannot be taken for the original."""
 
+RECIPE = 1
+"""To be raised whenever `fetch` unpacks or builds something else, so that no old folder is taken for a new one."""
+
 HOW_TO_FETCH = "run make kernel-parts"
 
 
@@ -66,7 +69,7 @@ class Machine:
 
 def cache() -> Path:
     """The folder of unpacked packages: outside the repository, rebuilt when missing."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fusion-kernel"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fusion-kernel" / str(RECIPE)
 
 
 def tool(name: str) -> str:
