@@ -59,7 +59,7 @@ def run(
         try:
             subprocess.run(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, timeout=limit_s, check=False)
         except subprocess.TimeoutExpired:
-            raise GuestError(_story(share, f"{job} had not ended after {limit_s:.0f} s")) from None
+            raise GuestError(_story(share, f"{job} had not ended after {limit_s:g} s")) from None
     if not (share / "status").is_file() or (share / "status").read_text().strip() != "0":
         raise GuestError(_story(share, f"{job} failed in the guest"))
     return Result(json.loads((share / "answer.json").read_text()), (share / "output").read_text(), share)

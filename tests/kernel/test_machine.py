@@ -26,6 +26,12 @@ def test_a_job_that_fails_in_the_guest_fails_here_with_its_traceback(run_job):
         run_job("hello")
 
 
+@pytest.mark.kernel
+def test_a_guest_that_does_not_end_is_ended_and_told_of(run_job):
+    with pytest.raises(GuestError, match=r"hello had not ended after 0.1 s"):
+        run_job("hello", greeting="good night", limit_s=0.1)
+
+
 def test_a_host_without_the_emulator_is_told_what_to_install(monkeypatch):
     monkeypatch.setitem(machine.HOST_TOOLS, "qemu-system-vax", "qemu-system-x86")
     with pytest.raises(machine.MachineMissingError, match=r"qemu-system-vax.* apt-get install qemu-system-x86 "):
