@@ -102,6 +102,8 @@ def unpack_kernel(apt: Apt, target: Path) -> None:
     if version_of(package) < OLDEST_KERNEL:
         apt.add_backports()
         package = apt.kernel_package()
+    if version_of(package) < OLDEST_KERNEL:
+        raise MachineMissingError(f"apt's newest kernel is {package}; simulated radios measure ranges from 6.4 on")
     print(f"kernel tier: unpacking {package}")
     apt.unpack((package,), target)
     release = package.removeprefix("linux-image-")

@@ -45,12 +45,6 @@ class Machine:
         return self.modules.name
 
     @property
-    def version(self) -> tuple[int, int]:
-        """Its first two numbers: (6, 12)."""
-        major, minor = self.release.split(".")[:2]
-        return int(major), int(minor)
-
-    @property
     def image(self) -> Path:
         """What the emulator starts."""
         return self.kernel / "boot" / f"vmlinuz-{self.release}"

@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from kernel.guest.netlink import (
-    ERROR,
     Attributes,
     Family,
     Message,
@@ -62,7 +61,6 @@ class Medium:
 
     def __init__(self, air: Air) -> None:
         self.air = air
-        self.carried = self.refused = 0
         self.error: Exception | None = None
         self._hwsim = Family("MAC80211_HWSIM")
         self._hwsim.command(REGISTER)
@@ -89,10 +87,8 @@ class Medium:
             self.error = error
 
     def _serve(self, message: Message) -> None:
-        if message.kind == ERROR:
-            # EINVAL for a receiver that is down or on another channel: that is how radios are.
-            self.refused += integer(message.payload[:4], signed=True) < 0
-        elif message.command == FRAME:
+        # Answers of kind ERROR pass by: EINVAL for a receiver that is down or on another channel is how radios are.
+        if message.command == FRAME:
             self._frame(attributes(message.payload))
         elif message.command == START_PMSR:
             self._measure(attributes(message.payload))
@@ -103,7 +99,6 @@ class Medium:
         for receiver_address, receiver in self._radios.items():
             rssi = None if receiver == sender else self.air.rssi_dbm(sender, receiver)
             if rssi is not None:
-                self.carried += 1
                 self._hwsim.send(
                     FRAME,
                     attribute(RECEIVER, receiver_address),

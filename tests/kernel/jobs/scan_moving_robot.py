@@ -17,7 +17,6 @@ class Seen:
 
     scans: list[list[Reading]] = field(default_factory=list)
     without_medium: list[Reading] = field(default_factory=list)
-    carried: int = 0
 
 
 def run(path: list[Point]) -> dict[str, Any]:
@@ -29,7 +28,6 @@ def run(path: list[Point]) -> dict[str, Any]:
         for place in path:
             air.robot = place
             seen.scans.append(scanner.scan(FREQUENCIES_MHZ))
-        seen.carried = medium.carried
         medium.close()
         seen.without_medium = scanner.scan(FREQUENCIES_MHZ)
     return asdict(seen)
