@@ -4,13 +4,20 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint clean
+.PHONY: demo test test-kernel kernel-parts lint clean
 
 demo: $(READY)
 	$(BIN)/fusion demo --output fusion-demo
 
 test: $(READY)
 	$(BIN)/python -m pytest -q -n auto
+
+# The real drivers of a real kernel, emulated: docs/kernel-tier.md.
+test-kernel: kernel-parts
+	$(BIN)/python -m pytest -q -n 2 -m kernel tests/kernel
+
+kernel-parts: $(READY)
+	PYTHONPATH=tests $(BIN)/python -m kernel.fetch
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -23,7 +23,7 @@ from mcap.summary import Summary
 
 from logs.damage import Damage, Hole
 from logs.records import HEAD, MAGIC, PARSERS, ExactStream, Piece, inside, packed, parse
-from logs.writer import LOSS_NS, LIBRARY
+from logs.writer import LIBRARY, LOSS_NS
 
 DATA_END = HEAD + 4
 FOOTER = HEAD + 8 + 8 + 4
