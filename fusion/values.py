@@ -63,12 +63,16 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True)
 class Gyro:
-    """Turn rate about the vertical [rad/s], left positive, raw: the bias is not taken off."""
+    """Turn rate about the vertical [rad/s], left positive, raw: the bias is not taken off.
+
+    ``acceleration_m_s2`` is that of the same chip along its own axes, None where it has none.
+    """
 
     time_ns: int
     sensor: str
     seq: int
     rate_rad_s: float
+    acceleration_m_s2: tuple[float, float, float] | None = None
 
 
 class RssiReading(NamedTuple):

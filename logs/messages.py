@@ -174,9 +174,10 @@ def _decode_odometry(data: bytes, seq: int) -> Odometry:
 
 def _encode_gyro(value: Gyro) -> bytes:
     no_orientation = (0.0, 0.0, 0.0, 1.0, NOT_GIVEN, *[0.0] * 8)
-    no_acceleration = (0.0, 0.0, 0.0, NOT_GIVEN, *[0.0] * 8)
+    known = value.acceleration_m_s2
+    acceleration = (0.0, 0.0, 0.0, NOT_GIVEN, *[0.0] * 8) if known is None else (*known, *[0.0] * 9)
     message = stamped(value.time_ns, value.sensor).put("d", *no_orientation)
-    return message.put("d", 0.0, 0.0, value.rate_rad_s, *[0.0] * 9, *no_acceleration).message()
+    return message.put("d", 0.0, 0.0, value.rate_rad_s, *[0.0] * 9, *acceleration).message()
 
 
 def _decode_gyro(data: bytes, seq: int) -> Gyro:
@@ -185,7 +186,9 @@ def _decode_gyro(data: bytes, seq: int) -> Gyro:
     *_, rate_rad_s, first_covariance = cursor.take("d", 17)
     if first_covariance == NOT_GIVEN:
         raise ValueError("the message says that it measures no turn rate")
-    return Gyro(time_ns, sensor, seq, rate_rad_s)
+    cursor.take("d", 8)
+    x, y, z, first_covariance = cursor.take("d", 4)
+    return Gyro(time_ns, sensor, seq, rate_rad_s, None if first_covariance == NOT_GIVEN else (x, y, z))
 
 
 def _encode_scan(value: WifiScan) -> bytes:

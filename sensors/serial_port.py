@@ -10,17 +10,8 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from fusion import (
-    BusyError,
-    Clock,
-    DependencyError,
-    DeviceLostError,
-    DriverError,
-    Found,
-    Needs,
-    NotFoundError,
-    NotPermittedError,
-)
+from fusion import Clock, DependencyError, DeviceLostError, DriverError, Found, Needs, NotFoundError
+from sensors.device_errors import device_error
 
 NEEDS = Needs(groups=("dialout",), modules=("serialx",))
 CHUNK = 4096
@@ -93,15 +84,11 @@ class SerialPort:
 
 def opening_error(path: str, error: OSError) -> DriverError:
     """What the refusal to open a port means (open(2), flock(2))."""
-    if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        return NotFoundError(f"{path} is not there", "plug it in; `fusion sensors` lists the ports that are")
-    if error.errno in (errno.EACCES, errno.EPERM):
-        return NotPermittedError(f"{path} may not be opened", "sudo usermod -aG dialout $USER, and log in again")
-    if error.errno in (errno.EBUSY, errno.EAGAIN):
-        return BusyError(f"{path} is in use", f"stop the other program: fuser -v {path} names it")
     if error.errno == errno.ENOTTY:
         return NotFoundError(f"{path} is no serial port", "give the path of a port: `fusion sensors` lists them")
-    return DeviceLostError(f"{path} cannot be opened ({error})", "unplug it and plug it in again")
+    absent = "plug it in; `fusion sensors` lists the ports that are there"
+    busy = f"stop the other program: fuser -v {path} names it"
+    return device_error(path, error, group="dialout", absent=absent, busy=busy)
 
 
 def find_ports() -> list[Found]:

@@ -19,6 +19,7 @@ from logs.writer import RunWriter
 from sensors.computer import boot_id, clock_sync, free_bytes
 from sensors.keeper import Received
 from sensors.robot_file import RobotFile
+from sensors.standstill import Standstill
 
 MEGABYTE = 1_000_000
 ROBOT_FILE = "robot.toml"
@@ -38,6 +39,7 @@ class SplitLog:
         self._first = f"{self._stem}-{self._number:04d}"
         self._began_ns = prior.time_ns
         self._devices: dict[str, DeviceInfo] = {}
+        self._standstill = Standstill()
         self._log = self._begin(prior)
 
     def __enter__(self) -> SplitLog:
@@ -57,6 +59,8 @@ class SplitLog:
             self._log.write_truth(said, log_time_ns=at_ns)
         else:
             self._log.write(said, log_time_ns=at_ns)
+        for remark in self._standstill.hear(said):
+            self._log.write_remark(remark, log_time_ns=at_ns)
 
     def write_clock(self) -> None:
         """Append how the clocks stand now."""

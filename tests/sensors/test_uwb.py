@@ -173,7 +173,7 @@ def test_a_line_without_an_end_is_given_up_and_counted():
         (16, BusyError, "fuser"),
         (11, BusyError, "fuser"),
         (25, NotFoundError, "no serial port"),
-        (5, DeviceLostError, "unplug"),
+        (5, DeviceLostError, "cable"),
     ],
 )
 def test_every_refusal_of_a_port_has_its_remedy(number, kind, hint):

@@ -1,0 +1,70 @@
+"""The bias of a gyro while the robot stands: the wheels tell for nothing when that is.
+
+A bias is measured over five seconds in which no wheel counted and the gyro was quiet, and told as a remark of the gyro;
+the recording keeps the raw rates. One that differs from the last by more than a gyro drifts while it stands was a hand
+that turned the robot, and is told as that.
+"""
+
+from __future__ import annotations
+
+import math
+from statistics import fmean, stdev
+
+from fusion import Level, Remark, Said
+from fusion.values import Gyro, WheelTicks, nanoseconds
+
+STAND_NS = nanoseconds(5.0)
+QUIET_RAD_S = 0.02
+"""Greatest standard deviation of a gyro that lies still: ten times that of a cheap one."""
+MOVED_RAD_S = 0.01
+"""A step between two standstills that no drift explains (0.6 degrees a second)."""
+LEAST_SAMPLES = 20
+
+
+class Standstill:
+    """Watches what the sensors say, and answers with a bias at the end of five seconds of standstill."""
+
+    def __init__(self) -> None:
+        self._counts: dict[str, tuple[int, ...]] = {}
+        self._since_ns: int | None = None
+        self._rates: dict[str, list[float]] = {}
+        self._last: dict[str, float] = {}
+
+    def hear(self, said: Said) -> list[Remark]:
+        """The biases that ``said`` completes."""
+        if isinstance(said, WheelTicks):
+            return self._wheels(said)
+        if isinstance(said, Gyro) and self._since_ns is not None and said.time_ns >= self._since_ns:
+            self._rates.setdefault(said.sensor, []).append(said.rate_rad_s)
+        return []
+
+    def _wheels(self, ticks: WheelTicks) -> list[Remark]:
+        stands = self._counts.get(ticks.sensor) == ticks.counts
+        self._counts[ticks.sensor] = ticks.counts
+        if not stands:
+            self._since_ns, self._rates = None, {}
+            return []
+        if self._since_ns is None:
+            self._since_ns = ticks.time_ns
+        if ticks.time_ns - self._since_ns < STAND_NS:
+            return []
+        told = [remark for sensor, rates in self._rates.items() for remark in self._bias(ticks.time_ns, sensor, rates)]
+        self._since_ns, self._rates = ticks.time_ns, {}
+        return told
+
+    def _bias(self, time_ns: int, sensor: str, rates: list[float]) -> list[Remark]:
+        if len(rates) < LEAST_SAMPLES or (spread := stdev(rates)) > QUIET_RAD_S:
+            return []
+        bias = fmean(rates)
+        moved = abs(bias - self._last.get(sensor, bias)) > MOVED_RAD_S
+        if not moved:
+            self._last[sensor] = bias
+        values = {
+            "bias_rad_s": bias,
+            "bias_std_rad_s": spread / math.sqrt(len(rates)),
+            "noise_std_rad_s": spread,
+            "samples": len(rates),
+        }
+        text = "turned while the wheels stood" if moved else "bias at standstill"
+        named = tuple((key, repr(value)) for key, value in values.items())
+        return [Remark(time_ns, sensor, Level.WARN if moved else Level.OK, text, named)]

@@ -1,0 +1,111 @@
+"""Counts are the kernel's: a program that is held up loses times and no distance, and unplugging loses nothing."""
+
+import errno
+
+import pytest
+
+from fusion import BootClock, BusyError, DeviceLostError, NotPermittedError, Remark, SettingError, WheelTicks
+from sensors.encoders import BUFFER, Edge, Encoders, FakeLines
+
+
+@pytest.fixture
+def wheels():
+    with Encoders.fake() as device:
+        driver = Encoders("wheels", device.clock, **device.settings)
+        driver.open()
+        yield driver, device
+        driver.close()
+
+
+def report(driver):
+    """What is said with the next counts."""
+    said = []
+    while not any(isinstance(one, WheelTicks) for one in said):
+        said += driver.poll(0.2)
+    return said
+
+
+def counts(driver):
+    return report(driver)[-1].counts
+
+
+def test_counts_are_the_numbers_of_the_last_edges(wheels):
+    driver, device = wheels
+    assert counts(driver) == (0, 0)
+    device.turn(5)
+    assert counts(driver) == (5, 5)
+    device._numbers[17] += 1
+    device._edges.append(Edge(17, device._numbers[17]))
+    assert counts(driver) == (6, 5)
+
+
+def test_wheels_that_stand_are_told_of_too(wheels):
+    driver, _ = wheels
+    assert [counts(driver) for _ in range(3)] == [(0, 0)] * 3
+
+
+def test_edges_that_nobody_read_count_all_the_same_and_are_told(wheels):
+    driver, device = wheels
+    report(driver)
+    device.turn(1550)
+    remark, ticks = report(driver)
+    assert ticks.counts == (1550, 1550)
+    assert dict(remark.values)["edges"] == str(2 * 1550 - BUFFER)
+
+
+def test_counting_goes_on_after_an_unplugged_chip(wheels):
+    driver, device = wheels
+    device.turn(7)
+    report(driver)
+    device.unplug()
+    with pytest.raises(DeviceLostError, match="plug it in again"):
+        report(driver)
+    driver.close()
+    device.plug()
+    driver.open()
+    device.turn(2)
+    assert counts(driver) == (9, 9)
+
+
+def test_a_stamp_lies_a_debouncing_time_before_its_report():
+    device = FakeLines()
+    driver = Encoders("wheels", device.clock, **device.settings, debounce_s=0.05)
+    driver.open()
+    report(driver)
+    report(driver)
+    ticks = report(driver)[-1]
+    assert device.clock.now_ns() - ticks.time_ns >= 50_000_000
+
+
+@pytest.mark.parametrize(
+    ("number", "kind", "told"),
+    [
+        (errno.EBUSY, BusyError, "gpioinfo"),
+        (errno.EACCES, NotPermittedError, "usermod -aG gpio"),
+        (errno.EINVAL, SettingError, "no such lines"),
+        (errno.EIO, DeviceLostError, "/dev/fake"),
+    ],
+)
+def test_every_refusal_has_its_remedy(number, kind, told, monkeypatch):
+    device = FakeLines()
+
+    def refuse(*_):
+        raise OSError(number, "refused")
+
+    monkeypatch.setattr(device, "open", refuse)
+    with pytest.raises(kind, match=told):
+        Encoders("wheels", BootClock(), **device.settings).open()
+
+
+@pytest.mark.parametrize(
+    "settings", [{"lines": ()}, {"lines": (1, 1)}, {"lines": (-1,)}, {"hz": 0.0}, {"debounce_s": 2.0}]
+)
+def test_settings_that_cannot_be_are_refused(settings):
+    with pytest.raises(SettingError):
+        Encoders("wheels", BootClock(), **{"lines": (17, 27), **settings})
+
+
+def test_a_remark_is_no_measurement(wheels):
+    driver, device = wheels
+    device.garble()
+    assert any(isinstance(one, Remark) for one in report(driver))
