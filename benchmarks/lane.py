@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import fusion
 from benchmarks.metrics.track import FateColumns, Track
 from benchmarks.prior import starting_prior
 from fusion import FusionError, Update
+from fusion.track import Key
 from logs.run import Run
 
 
@@ -21,6 +22,7 @@ class Lane:
     ``updates`` stand in the order of arrival, revisions among them; ``digest`` certifies them. ``cpu_s`` is the
     processor time of the fold alone. ``error`` is None, or why the estimator stopped: ``updates`` ends there then,
     ``digest`` is empty and ``cpu_s`` zero. ``ghost_of``: of which estimator this is a counterfactual, None: of none.
+    ``true_stamps``: those of the run.
     """
 
     name: str
@@ -29,6 +31,7 @@ class Lane:
     cpu_s: float
     error: str | None
     ghost_of: str | None = None
+    true_stamps: Mapping[Key, int] = field(default_factory=dict)
 
     @cached_property
     def final(self) -> tuple[Update, ...]:
@@ -38,7 +41,7 @@ class Lane:
     @cached_property
     def track(self) -> Track:
         """All updates as columns; of an estimator that crashed none, for half a run is not a result."""
-        return Track.of(() if self.error else self.updates)
+        return Track.of(() if self.error else self.updates, self.true_stamps)
 
     @cached_property
     def fates(self) -> FateColumns:
@@ -61,4 +64,4 @@ def run_lane(run: Run, estimator: str, options: Mapping[str, object] | None = No
         error = str(known)
     except Exception as unknown:  # noqa: BLE001 - a plug-in may fail in any way, and costs only its own lane
         error = f"{estimator} failed: {unknown!r}; leave it out with --estimators"
-    return Lane(estimator, tuple(updates), certificate, cpu_s, error)
+    return Lane(estimator, tuple(updates), certificate, cpu_s, error, true_stamps=run.true_stamps)

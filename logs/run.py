@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fusion import Estimate, Measurement, Prior, Truth, World
+from fusion.track import Key
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,8 @@ class TruthTrack:
 @dataclass(frozen=True, slots=True)
 class Run:
     """One recorded run. ``measurements`` stand in the order they arrived; ``lanes`` holds the estimates of estimators
-    that were replayed into the log, by name.
+    that were replayed into the log, by name. ``true_stamps``: where a wrong clock stamped a measurement, the time a
+    right one would have stamped it with [ns], by `fusion.track.order`; empty but for runs that were given that fault.
     """
 
     path: Path
@@ -52,3 +54,4 @@ class Run:
     truth: TruthTrack | None
     warnings: tuple[str, ...]
     lanes: Mapping[str, tuple[Estimate, ...]]
+    true_stamps: Mapping[Key, int] = field(default_factory=dict)
