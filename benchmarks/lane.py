@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
 
@@ -14,6 +14,7 @@ from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.track import Track
 from benchmarks.prior import starting_prior
 from fusion import FusionError, Measurement, Tracker, Update
+from fusion.track import Key
 from logs.run import Run
 
 Watch: TypeAlias = Callable[[Tracker, Measurement], None]
@@ -28,6 +29,7 @@ class Lane:
     processor time of the fold alone. ``error`` is None, or why the estimator stopped: ``updates`` ends there then,
     ``digest`` is empty and ``cpu_s`` zero. ``ghost_of``: of which estimator this is a counterfactual, None: of none.
     ``clouds``: its particles, where somebody watched them.
+    ``true_stamps``: those of the run.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Lane:
     error: str | None
     ghost_of: str | None = None
     clouds: Clouds | None = None
+    true_stamps: Mapping[Key, int] = field(default_factory=dict)
 
     @cached_property
     def final(self) -> tuple[Update, ...]:
@@ -46,7 +49,7 @@ class Lane:
     @cached_property
     def track(self) -> Track:
         """All updates as columns; of an estimator that crashed none, for half a run is not a result."""
-        return Track.of(() if self.error else self.updates)
+        return Track.of(() if self.error else self.updates, self.true_stamps)
 
     @cached_property
     def fates(self) -> FateColumns:
@@ -80,4 +83,4 @@ def run_lane(
         error = str(known)
     except Exception as unknown:  # noqa: BLE001 - a plug-in may fail in any way, and costs only its own lane
         error = f"{estimator} failed: {unknown!r}; leave it out with --estimators"
-    return Lane(estimator, tuple(updates), certificate, cpu_s, error)
+    return Lane(estimator, tuple(updates), certificate, cpu_s, error, true_stamps=run.true_stamps)

@@ -13,7 +13,16 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from estimators.sampling import Array, carried, judged, mixture, moments, total_variance
+from estimators.sampling import (
+    MOST_ALIKE,
+    Array,
+    carried,
+    judged,
+    mixture,
+    moments,
+    repeated_variance,
+    require_most_alike,
+)
 from fusion import (
     Covariance,
     Estimate,
@@ -39,13 +48,16 @@ from fusion.screen import unusable
 
 
 class State(NamedTuple):
-    """Probability of each (heading bin, x cell, y cell) with its moments, and the motion not yet applied to it."""
+    """Probability of each (heading bin, x cell, y cell) with its moments, and the motion not yet applied to it;
+    ``heard_m``: how much of its path lay behind at the last reading.
+    """
 
     time_ns: int
     histogram: Array
     pose: Pose
     covariance: Covariance
     motion: Increment
+    heard_m: float = 0.0
 
 
 class BayesGrid:
@@ -59,18 +71,30 @@ class BayesGrid:
         How many heading bins a full turn has.
     outlier_share
         Share of readings expected to be outliers, in (0, 1).
+    most_alike
+        How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
+        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry.
     """
 
     summary: ClassVar[str] = "histogram Bayes filter over floor and heading; starts from anywhere"
     tags: ClassVar[frozenset[Tag]] = frozenset({Tag.GLOBAL_START, Tag.HEADING_START})
 
-    def __init__(self, world: World, *, cells: int = 1600, headings: int = 24, outlier_share: float = 0.05) -> None:
+    def __init__(
+        self,
+        world: World,
+        *,
+        cells: int = 1600,
+        headings: int = 24,
+        outlier_share: float = 0.05,
+        most_alike: float = MOST_ALIKE,
+    ) -> None:
         if cells < 4 or headings < 4:
             raise ParameterError(f"bayes_grid: cells is {cells}, headings {headings}; give at least 4 of each")
         if not 0.0 < outlier_share < 1.0:
             raise ParameterError(f"bayes_grid: outlier_share is {outlier_share}; give a share between 0 and 1")
         self._world = world
         self._outlier_share = outlier_share
+        self._most_alike = require_most_alike("bayes_grid", most_alike)
         bounds = world.bounds
         width, depth = bounds.x_max - bounds.x_min, bounds.y_max - bounds.y_min
         self._cell_m = math.sqrt(width * depth / cells)
@@ -121,29 +145,34 @@ class BayesGrid:
         return State(time_ns, histogram, pose, spread, motion)
 
     def _update(self, state: State, scan: WifiScan | Ranges) -> tuple[State, tuple[Fate, ...]]:
+        path_m = state.motion.path_m - state.heard_m
         if self._has_outgrown_a_cell(state.motion):
             state = self._state(scan.time_ns, self._moved(state.histogram, state.motion), Increment())
         pose, covariance = compose(state.pose, state.covariance, state.motion)
         histogram, fates = state.histogram, []
         for sighting in sightings(self._world, scan):
-            likelihood, good = self._likelihood(sighting, state.motion)
+            likelihood, good = self._likelihood(sighting, state.motion, path_m)
             share = min(float(np.sum(state.histogram * good)), 1.0)
             fates.append(judged(scan, sighting, pose, covariance, self._world.robot.antenna_m, share))
             histogram = histogram * likelihood
             histogram = histogram / histogram.sum()
-        return self._state(scan.time_ns, histogram, state.motion), tuple(fates)
+        heard = self._state(scan.time_ns, histogram, state.motion)._replace(heard_m=state.motion.path_m)
+        return heard, tuple(fates)
 
     def _has_outgrown_a_cell(self, motion: Increment) -> bool:
         noise = max(motion.xx, motion.yy) > (0.5 * self._cell_m) ** 2 or motion.hh > (0.5 * self._bin_rad) ** 2
         return noise or math.hypot(motion.x, motion.y) >= self._cell_m or abs(motion.heading) >= self._bin_rad
 
-    def _likelihood(self, sighting: Sighting, motion: Increment) -> tuple[Array, Array]:
-        """The mixture in every cell, moved by ``motion``; the reading's variance includes its spread within a cell."""
+    def _likelihood(self, sighting: Sighting, motion: Increment, path_m: float) -> tuple[Array, Array]:
+        """The mixture in every cell, moved by ``motion``, of a reading ``path_m`` after the one before; the reading's
+        variance includes its spread within a cell.
+        """
         x, y = carried(self._x, self._y, self._heading, motion)
         expected = sighting.expected_values(x, y, self._heading + motion.heading, self._world.robot.antenna_m)
         # One heading's floor shows the spread within a cell well enough for all.
         by_x, by_y = np.gradient(expected[0])
-        variance = total_variance(sighting) + (by_x * by_x + by_y * by_y) / 12.0
+        spread = repeated_variance(sighting, path_m, self._most_alike)
+        variance = spread + (by_x * by_x + by_y * by_y) / 12.0
         return mixture(sighting.value - expected, variance, self._outlier_share)
 
     def _moved(self, histogram: Array, motion: Increment) -> Array:

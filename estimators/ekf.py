@@ -16,6 +16,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.sampling import MOST_ALIKE, alike, require_most_alike
 from fusion import (
     Covariance,
     Decision,
@@ -43,8 +44,6 @@ from fusion.screen import unusable
 Array = NDArray[np.float64]
 POSE = slice(0, 3)
 HEADING = 2
-MOST_ALIKE = 3.0
-"""How many neighbouring readings at most are taken to share one error."""
 
 
 class State(NamedTuple):
@@ -73,6 +72,9 @@ class Ekf:
     rssi_bias_length_m, range_bias_length_m
         Path after which an anchor's common error is forgotten by 1/e [m]: shadowing belongs to the place, a range
         offset to the radio.
+    most_alike
+        How many neighbouring readings of an anchor at most are taken to share one error, where that is not a state. 1
+        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry.
     """
 
     summary: ClassVar[str] = "extended Kalman filter with odometry calibration and anchor biases as states"
@@ -88,6 +90,7 @@ class Ekf:
         estimate_rssi_bias: bool = False,
         rssi_bias_length_m: float = 2.0,
         range_bias_length_m: float = 100.0,
+        most_alike: float = MOST_ALIKE,
     ) -> None:
         if not 0.0 < gate_probability <= 1.0:
             raise ParameterError(f"ekf: gate_probability is {gate_probability}; give a probability in (0, 1]")
@@ -96,6 +99,7 @@ class Ekf:
                 raise ParameterError(f"ekf: a bias length is {length_m}; give a length greater than zero")
         self._world = world
         self._gate = chi_square_gate(gate_probability)
+        self._most_alike = require_most_alike("ekf", most_alike)
         noise = world.robot.noise
         calibration = (noise.distance_scale_std, noise.turn_scale_std, noise.turn_bias_std_rad_s)
         self._calibrated = estimate_odometry and any(calibration)
@@ -224,8 +228,8 @@ class Ekf:
             row[gain] = expected.by_gain
             innovation -= expected.by_gain * float(mean[gain])
         if (bias := self._bias_index.get((sighting.anchor.id, kind))) is None:
-            alike = min(max(self._lengths_m[kind] / max(path_m, 1e-9), 1.0), MOST_ALIKE)
-            return innovation, row, variance + alike * sighting.model.bias_std**2
+            sharing = alike(path_m, self._lengths_m[kind], self._most_alike)
+            return innovation, row, variance + sharing * sighting.model.bias_std**2
         row[bias] = 1.0
         return innovation - float(mean[bias]), row, variance
 

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from estimators.ekf import chi_square_gate
-from estimators.sampling import Array, total_variance
+from estimators.sampling import MOST_ALIKE, Array, repeated_variance, require_most_alike, total_variance
 from fusion import (
     Covariance,
     Decision,
@@ -58,12 +58,13 @@ class FilterpyFilter(ABC):
 
     tags: ClassVar[frozenset[Tag]] = frozenset({Tag.HEADING_START})
 
-    def __init__(self, world: World, *, gate_probability: float = 0.999) -> None:
+    def __init__(self, world: World, *, gate_probability: float = 0.999, most_alike: float = MOST_ALIKE) -> None:
         if not 0.0 < gate_probability <= 1.0:
             raise ParameterError(f"filterpy: gate_probability is {gate_probability}; give a probability in (0, 1]")
         filterpy_kalman()
         self._world = world
         self._gate = chi_square_gate(gate_probability)
+        self._most_alike = require_most_alike("filterpy", most_alike)
 
     @abstractmethod
     def _predicted(self, state: State) -> Any:  # noqa: ANN401 - filterpy is not typed
@@ -74,8 +75,8 @@ class FilterpyFilter(ABC):
         """What ``belief`` expects of each reading, and how uncertain it is of that; both (m,)."""
 
     @abstractmethod
-    def _correct(self, belief: Any, readings: Readings) -> None:  # noqa: ANN401
-        """Bring all ``readings`` into ``belief`` by one update of filterpy."""
+    def _correct(self, belief: Any, readings: Readings, noise: Array) -> None:  # noqa: ANN401
+        """Bring all ``readings`` into ``belief`` by one update of filterpy; ``noise`` is R (m, m)."""
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
         """The prior; what is unknown gets the moments of a uniform distribution."""
@@ -111,7 +112,9 @@ class FilterpyFilter(ABC):
             who = (scan.time_ns, scan.sensor, scan.seq, sighting.anchor.id)
             fates.append(Fate(*who, *verdict, innovation, spread, nis))
         if used:
-            self._correct(belief, tuple(used))
+            path_m = state.motion.path_m
+            noise = np.diag([repeated_variance(sighting, path_m, self._most_alike) for sighting in used])
+            self._correct(belief, tuple(used), noise)
         return State(scan.time_ns, *copied_out(belief), Increment()), tuple(fates)
 
 
@@ -123,6 +126,9 @@ class FilterpyEkf(FilterpyFilter):
     gate_probability
         A reading is refused when its normalised innovation squared is beyond this quantile of chi-square with one
         degree of freedom. 1.0 takes every reading.
+    most_alike
+        How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
+        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry.
     """
 
     summary: ClassVar[str] = "extended Kalman filter of filterpy"
@@ -142,11 +148,10 @@ class FilterpyEkf(FilterpyFilter):
         values, jacobian = self._linearised(belief.x, readings)
         return values, np.einsum("mi,ij,mj->m", jacobian, belief.P, jacobian)
 
-    def _correct(self, belief: Any, readings: Readings) -> None:  # noqa: ANN401
+    def _correct(self, belief: Any, readings: Readings, noise: Array) -> None:  # noqa: ANN401
         values, jacobian = self._linearised(belief.x, readings)
-        variances = np.diag([total_variance(sighting) for sighting in readings])
         seen = np.array([sighting.value for sighting in readings])
-        belief.update(seen, lambda _: jacobian, lambda _: values, R=variances)
+        belief.update(seen, lambda _: jacobian, lambda _: values, R=noise)
 
     def _linearised(self, x: Array, readings: Readings) -> tuple[Array, Array]:
         """Expected readings (m,) and their Jacobian (m, 3) at the pose ``x``."""

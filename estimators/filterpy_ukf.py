@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from estimators.filterpy_ekf import FilterpyFilter, Readings, State, away, filterpy_kalman, motion_noise
-from estimators.sampling import Array, square_root, total_variance
+from estimators.sampling import Array, square_root
 
 
 class FilterpyUkf(FilterpyFilter):
@@ -24,6 +24,9 @@ class FilterpyUkf(FilterpyFilter):
     gate_probability
         A reading is refused when its normalised innovation squared is beyond this quantile of chi-square with one
         degree of freedom. 1.0 takes every reading.
+    most_alike
+        How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
+        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry.
     """
 
     summary: ClassVar[str] = "unscented Kalman filter of filterpy"
@@ -44,10 +47,9 @@ class FilterpyUkf(FilterpyFilter):
         values = belief.Wm @ expected
         return values, belief.Wc @ np.square(expected - values)
 
-    def _correct(self, belief: Any, readings: Readings) -> None:  # noqa: ANN401
-        variances = np.diag([total_variance(sighting) for sighting in readings])
+    def _correct(self, belief: Any, readings: Readings, noise: Array) -> None:  # noqa: ANN401
         seen = np.array([sighting.value for sighting in readings])
-        belief.update(seen, R=variances, hx=lambda x: self._expected_at(x[None, :], readings)[0])
+        belief.update(seen, R=noise, hx=lambda x: self._expected_at(x[None, :], readings)[0])
 
     def _expected_at(self, poses: Array, readings: Readings) -> Array:
         """Expected readings (n, m) at ``poses`` (n, 3)."""

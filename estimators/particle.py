@@ -14,7 +14,17 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from estimators.sampling import Array, carried, judged, mixture, moments, square_root, total_variance
+from estimators.sampling import (
+    MOST_ALIKE,
+    Array,
+    carried,
+    judged,
+    mixture,
+    moments,
+    repeated_variance,
+    require_most_alike,
+    square_root,
+)
 from fusion import (
     Covariance,
     Estimate,
@@ -69,12 +79,17 @@ class Particle:
         How many; time and memory grow in proportion.
     outlier_share
         Share of readings expected to be outliers, in (0, 1).
+    most_alike
+        How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
+        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry.
     """
 
     summary: ClassVar[str] = "particle filter with an outlier mixture; starts from anywhere"
     tags: ClassVar[frozenset[Tag]] = frozenset({Tag.STOCHASTIC, Tag.GLOBAL_START, Tag.HEADING_START})
 
-    def __init__(self, world: World, *, particles: int = 1000, outlier_share: float = 0.05) -> None:
+    def __init__(
+        self, world: World, *, particles: int = 1000, outlier_share: float = 0.05, most_alike: float = MOST_ALIKE
+    ) -> None:
         if particles < 1:
             raise ParameterError(f"particle: particles is {particles}; give at least 1")
         if not 0.0 < outlier_share < 1.0:
@@ -82,6 +97,7 @@ class Particle:
         self._world = world
         self._count = particles
         self._outlier_share = outlier_share
+        self._most_alike = require_most_alike("particle", most_alike)
 
     def start(self, prior: Prior, seed: int) -> State:
         """A cloud drawn from the prior; uniform over the floor, or all headings, where that is unknown."""
@@ -127,7 +143,8 @@ class Particle:
         for sighting in sightings(self._world, scan):
             expected = sighting.expected_values(cloud[X], cloud[Y], cloud[HEADING], antenna_m)
             between = float(state.weights @ np.square(expected - state.weights @ expected))
-            variance = total_variance(sighting) + BANDWIDTH**2 * between
+            spread = repeated_variance(sighting, state.motion.path_m, self._most_alike)
+            variance = spread + BANDWIDTH**2 * between
             likelihood, good = mixture(sighting.value - expected, variance, self._outlier_share)
             log_weights = log_weights + np.log(likelihood)
             share = min(float(state.weights @ good), 1.0)

@@ -12,12 +12,29 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fusion import Covariance, Decision, Fate, Increment, Pose, Ranges, Reason, Sighting, WifiScan, wrap_angle
+from fusion import (
+    Covariance,
+    Decision,
+    Fate,
+    Increment,
+    ParameterError,
+    Pose,
+    Ranges,
+    Reason,
+    Sighting,
+    WifiScan,
+    wrap_angle,
+)
+from fusion.radio import PathLoss
 
 Array = NDArray[np.float64]
 
 OUTLIER_WIDTH = 20.0
 """Width of the uniform part of the mixture, in standard deviations of the reading."""
+SHADOWING_LENGTH_M = 2.0
+"""Path over which an anchor's shadowing stays alike [m], where a filter has no parameter for it."""
+MOST_ALIKE = 3.0
+"""How many neighbouring readings at most are taken to share one error, unless a parameter says otherwise."""
 DOUBTED_BELOW = 0.5
 """A reading counts as down-weighted when it is more likely an outlier than not."""
 
@@ -45,6 +62,33 @@ def total_variance(sighting: Sighting) -> float:
     model = sighting.model
     by_gain = float(model.by_gain(model.distance(sighting.value)))
     return float(sighting.variance + model.bias_std**2 + (by_gain * model.gain_std) ** 2)
+
+
+def alike(path_m: float, length_m: float, most_alike: float) -> float:
+    """How many readings of one anchor, ``path_m`` apart, share an error that lasts for ``length_m``: each then counts
+    for as much less. ``most_alike`` bounds it, for a robot at rest would learn nothing more.
+
+    >>> [alike(path_m, length_m=2.0, most_alike=3.0) for path_m in (0.0, 1.0, 5.0)]
+    [3.0, 2.0, 1.0]
+    """
+    return min(max(length_m / max(path_m, 1e-9), 1.0), most_alike)
+
+
+def repeated_variance(sighting: Sighting, path_m: float, most_alike: float) -> float:
+    """`total_variance` for an update by one of many readings, ``path_m`` after the one before. Shadowing belongs to the
+    place (Gudmundson 1991), so what neighbouring signal strengths share is taken as many times as they are `alike`.
+    """
+    common = sighting.model.bias_std**2 if isinstance(sighting.model, PathLoss) else 0.0
+    return total_variance(sighting) + (alike(path_m, SHADOWING_LENGTH_M, most_alike) - 1.0) * common
+
+
+def require_most_alike(name: str, most_alike: float) -> float:
+    """``most_alike``; raises `ParameterError` where it is not a finite number of at least one."""
+    if not 1.0 <= most_alike < math.inf:
+        raise ParameterError(
+            f"{name}: most_alike is {most_alike}; give a number from 1, which takes all as independent"
+        )
+    return most_alike
 
 
 def moments(weights: Array, x: Array, y: Array, heading: Array) -> tuple[Pose, Covariance]:

@@ -9,6 +9,7 @@ counts exactly once.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -64,6 +65,19 @@ def wheel_increment(robot: Robot, rolled_m: Sequence[float]) -> tuple[float, flo
     return 0.5 * (left + right), (right - left) / robot.track_width_m
 
 
+def since(start_ns: int, odometry: Odometry) -> Odometry:
+    """What an increment that ends after ``start_ns`` tells of the time from there on, its twist taken as steady.
+
+    >>> since(60, Odometry(100, "wheels", 0, from_ns=0, distance_m=0.5, turn_rad=1.0)).distance_m
+    0.2
+    """
+    if odometry.from_ns >= start_ns:
+        return odometry
+    share = (odometry.time_ns - start_ns) / (odometry.time_ns - odometry.from_ns)
+    distance_m, turn_rad = share * odometry.distance_m, share * odometry.turn_rad
+    return replace(odometry, from_ns=start_ns, distance_m=distance_m, turn_rad=turn_rad)
+
+
 class _GyroAngle(NamedTuple):
     """The gyro's integral: angle [rad] at a time, and the rate then [rad/s]."""
 
@@ -76,8 +90,11 @@ class _GyroAngle(NamedTuple):
 
 
 class OdometerState(NamedTuple):
-    """What the odometer remembers. ``covered_ns``: motion is accounted for up to here."""
+    """What the odometer remembers. ``start_ns``: motion before it is none of this run's; ``covered_ns``: motion is
+    accounted for up to here.
+    """
 
+    start_ns: int
     covered_ns: int
     last_ns: int
     span_ns: int = 0
@@ -100,8 +117,8 @@ class Odometer:
         self._distance = LinearDistance(robot.distance_scale, robot.distance_offset_m)
 
     def start(self, time_ns: int) -> OdometerState:
-        """Motion is accounted for from ``time_ns`` on."""
-        return OdometerState(covered_ns=time_ns, last_ns=time_ns)
+        """Motion is accounted for from ``time_ns`` on; no increment that ends by then may be handed to `advance`."""
+        return OdometerState(start_ns=time_ns, covered_ns=time_ns, last_ns=time_ns)
 
     def advance(self, state: OdometerState, measurement: Measurement) -> tuple[OdometerState, tuple[Measurement, ...]]:
         """The measurements an estimator should see in place of ``measurement``, in order.
@@ -148,29 +165,29 @@ class Odometer:
         return state, tuple(motion)
 
     def _real(self, state: OdometerState, odometry: Odometry) -> tuple[OdometerState, tuple[Odometry, ...]]:
-        """A measured increment: what was held already is taken off."""
-        turn = odometry.turn_rad
+        """A measured increment: what was driven before the start, or held already, is taken off."""
+        own = since(state.start_ns, odometry)
+        turn = own.turn_rad
         angle = state.gyro_angle_at_last
         if self.robot.turn_source == "gyro" and state.gyro is not None:
             angle = state.gyro.at(odometry.time_ns)
             if odometry.time_ns - state.gyro.time_ns <= MAX_GYRO_AGE_NS:
                 turn = angle - state.gyro_angle_at_last
-        span_ns = odometry.time_ns - odometry.from_ns
         remaining = Odometry(
             odometry.time_ns,
             odometry.sensor,
             odometry.seq,
             min(state.covered_ns, odometry.time_ns),
-            odometry.distance_m - state.held_distance_m,
+            own.distance_m - state.held_distance_m,
             turn - state.held_turn_rad,
             odometry.measured,
         )
-        span_s = max(seconds(span_ns), 1e-9)
+        span_s = max(seconds(own.time_ns - own.from_ns), 1e-9)
         return state._replace(
             covered_ns=max(state.covered_ns, odometry.time_ns),
             last_ns=odometry.time_ns,
-            span_ns=span_ns,
-            speed_m_s=odometry.distance_m / span_s,
+            span_ns=odometry.time_ns - odometry.from_ns,
+            speed_m_s=own.distance_m / span_s,
             turn_rate_rad_s=turn / span_s,
             held_distance_m=0.0,
             held_turn_rad=0.0,

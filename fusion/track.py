@@ -20,7 +20,7 @@ from fusion.errors import PluginError
 from fusion.estimator import Estimator, ParticleEstimator, Particles
 from fusion.odometry import Odometer, OdometerState
 from fusion.screen import refused, screen, unusable
-from fusion.values import Decision, Estimate, Fate, Measurement, Prior, Ranges, Reason, WifiScan, nanoseconds
+from fusion.values import Decision, Estimate, Fate, Measurement, Odometry, Prior, Ranges, Reason, WifiScan, nanoseconds
 from fusion.world import World
 
 HORIZON_S = 2.0
@@ -70,6 +70,7 @@ class Tracker:
         self._world = world
         self._odometer = Odometer(world.robot)
         self._horizon_ns = nanoseconds(horizon_s)
+        self._start_ns = prior.time_ns
         self._base_key: Key = (prior.time_ns, -1, "", -1)
         self._base = _Moment(self._odometer.start(prior.time_ns), estimator.start(prior, seed))
         self._recent: deque[_Entry] = deque()
@@ -120,7 +121,8 @@ class Tracker:
             self._suspect_ns = measurement.time_ns
             return unusable(measurement, Reason.BAD_CLOCK)
         self._suspect_ns = None
-        if key <= self._base_key or measurement.time_ns < newest_ns - self._horizon_ns:
+        over = isinstance(measurement, Odometry) and measurement.time_ns <= self._start_ns
+        if over or key <= self._base_key or measurement.time_ns < newest_ns - self._horizon_ns:
             return refused(measurement, Decision.LATE, Reason.TOO_LATE)
         if key <= self._newest[0] and any(entry.key == key for entry in self._recent):
             return unusable(measurement, Reason.DUPLICATE)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fusion import Estimate, Measurement, Prior, Remark, Truth, World
+from fusion.track import Key
 from logs.device_messages import ClockSync
 
 
@@ -41,8 +42,10 @@ class TruthTrack:
 @dataclass(frozen=True, slots=True)
 class Run:
     """One recorded run. ``measurements`` stand in the order they arrived; ``lanes`` holds the estimates of estimators
-    that were replayed into the log, by name; ``remarks`` are what the devices said that is no measurement,
-    ``clocks`` how the clocks of the recording computer stood to each other.
+    that were replayed into the log, by name; ``remarks`` are what the devices said that is no measurement, ``clocks``
+    how the clocks of the recording computer stood to each other. ``true_stamps``: where a wrong clock stamped a
+    measurement, the time a right one would have stamped it with [ns], by `fusion.track.order`; empty but for runs that
+    were given that fault.
     """
 
     path: Path
@@ -56,3 +59,4 @@ class Run:
     lanes: Mapping[str, tuple[Estimate, ...]]
     remarks: tuple[Remark, ...] = ()
     clocks: tuple[ClockSync, ...] = ()
+    true_stamps: Mapping[Key, int] = field(default_factory=dict)

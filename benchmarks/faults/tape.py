@@ -28,6 +28,7 @@ from fusion import (
     WifiScan,
 )
 from fusion.odometry import wheel_increment
+from fusion.track import order as place
 from fusion.values import NANOSECONDS
 from fusion.world import DRIVES
 from logs.run import Run
@@ -78,8 +79,15 @@ class Tape:
         """
         counts = self._counts()
         order = (int(i) for i in np.argsort(self.arrival_ns, kind="stable") if self.messages.kept[i])
-        told = (self._stamped(i, self._message(i, counts)) for i in order)
-        return replace(self.run, prior=self.prior, measurements=tuple(message for message in told if message))
+        told = {i: self._stamped(i, self._message(i, counts)) for i in order}
+        measurements = {i: message for i, message in told.items() if message}
+        stamps = {place(message): self._true_stamp_ns(i) for i, message in measurements.items()}
+        wrong = {key: time_ns for key, time_ns in stamps.items() if key[0] != time_ns}
+        return replace(self.run, prior=self.prior, measurements=tuple(measurements.values()), true_stamps=wrong)
+
+    def _true_stamp_ns(self, i: int) -> int:
+        message = self.run.measurements[i]
+        return self.run.true_stamps.get(place(message), message.time_ns)
 
     def _message(self, i: int, counts: Mapping[int, tuple[int, ...]]) -> Measurement | None:
         """Message ``i`` with what its sensor tells now; None for a scan whose readings are all lost."""

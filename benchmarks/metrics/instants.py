@@ -1,8 +1,8 @@
 """When an estimator is judged, and by which of its estimates.
 
 The instants belong to the truth, never to the estimator: a filter cannot improve its mean by publishing more often
-while it is confident. Matching is causal: at an instant counts the newest estimate that had been received by then,
-held constant, and one that is too old counts as none at all.
+while it is confident. Matching is causal: at an instant counts the newest estimate that had been received by then and
+is about no later time, held constant, and one that is too old counts as none at all.
 """
 
 from __future__ import annotations
@@ -103,7 +103,8 @@ def interpolate_truth(known: Instants, time_ns: Whole, *, gap_s: float) -> tuple
 
 
 def match(instants: Instants, track: Track, *, max_age_s: float = MAX_AGE_S) -> Answers:
-    """For each instant the newest estimate received by then; of two with one stamp, the later received.
+    """For each instant the newest estimate received by then, and not about a time still to come, as those that follow
+    a clock that is ahead; of two with one stamp, the later received.
 
     Valid when the estimator says so, its position is finite and ``instant - stamp <= max_age_s`` in whole nanoseconds.
     """
@@ -114,11 +115,14 @@ def match(instants: Instants, track: Track, *, max_age_s: float = MAX_AGE_S) -> 
 
 def _newest(instants: Instants, stamp_ns: Whole, received_ns: Whole) -> tuple[Whole, Flags]:
     """Index of the newest stamp received by each instant, and whether any was; no index at all without stamps."""
-    rising = stamp_ns >= np.maximum.accumulate(stamp_ns)
-    newest = np.maximum.accumulate(np.where(rising, np.arange(len(stamp_ns)), 0))
-    received = np.searchsorted(received_ns, instants.time_ns, side="right") - 1
-    heard = received >= 0
-    return newest[np.maximum(received, 0)] if len(newest) else newest, heard
+    due_ns = np.maximum(received_ns, stamp_ns)
+    by_due = np.argsort(due_ns, kind="stable")
+    stamps = stamp_ns[by_due]
+    rising = stamps >= np.maximum.accumulate(stamps)
+    newest = by_due[np.maximum.accumulate(np.where(rising, np.arange(len(stamps)), 0))]
+    due = np.searchsorted(due_ns[by_due], instants.time_ns, side="right") - 1
+    heard = due >= 0
+    return newest[np.maximum(due, 0)] if len(newest) else newest, heard
 
 
 def _since_fix_s(instants: Instants, received_ns: Whole, fixes_ns: Whole) -> Floats:

@@ -5,13 +5,15 @@ Updates are objects, one per measurement; every metric wants arrays. They are tu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fusion import Decision, Estimate, Ranges, Reason, Update, WifiScan
+from fusion.track import Key, order
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -26,10 +28,10 @@ BELIEVED = (Decision.USED, Decision.DOWNWEIGHTED)
 class Track(NamedTuple):
     """Estimates in the order they were heard, n rows.
 
-    ``received_ns``: when each was there, the newest stamp among the messages received by then, so it never decreases;
-    a message whose own clock was refused says nothing about the time. ``time_ns``: the time it is about. ``pose``
-    (n, 3) [m, m, rad]. ``covariance`` (n, 6), in the order of `fusion.Covariance`, NaN where none was claimed.
-    ``fix_ns``: the stamp of the radio measurement that was believed just then, or `BEFORE_ALL_NS`.
+    ``received_ns``: when each was there, the newest true stamp among the messages received by then, so it never
+    decreases; a message whose own clock was refused says nothing about the time. ``time_ns``: the time it is about.
+    ``pose`` (n, 3) [m, m, rad]. ``covariance`` (n, 6), in the order of `fusion.Covariance`, NaN where none was claimed.
+    ``fix_ns``: the true stamp of the radio measurement that was believed just then, or `BEFORE_ALL_NS`.
     """
 
     received_ns: Stamps
@@ -41,10 +43,12 @@ class Track(NamedTuple):
     fix_ns: Stamps
 
     @classmethod
-    def of(cls, updates: Sequence[Update]) -> Track:
-        """The columns of all updates of one lane, revisions among them."""
-        clocks = [BEFORE_ALL_NS if _is_bad_clock(update) else update.measurement.time_ns for update in updates]
-        fixes = [update.measurement.time_ns if _is_fix(update) else BEFORE_ALL_NS for update in updates]
+    def of(cls, updates: Sequence[Update], true_stamps: Mapping[Key, int] = MappingProxyType({})) -> Track:
+        """The columns of all updates of one lane, revisions among them; ``true_stamps`` as in `logs.run.Run`."""
+        stamps = [true_stamps.get(order(update.measurement), update.measurement.time_ns) for update in updates]
+        told = list(zip(updates, stamps, strict=True))
+        clocks = [BEFORE_ALL_NS if _is_bad_clock(update) else stamp for update, stamp in told]
+        fixes = [stamp if _is_fix(update) else BEFORE_ALL_NS for update, stamp in told]
         said = cls.of_estimates([update.estimate for update in updates])
         received = np.maximum.accumulate(np.array(clocks, dtype=np.int64))
         return said._replace(received_ns=received, fix_ns=np.array(fixes, dtype=np.int64))

@@ -179,7 +179,15 @@ def test_gate_is_the_chi_square_quantile(probability):
 
 
 @pytest.mark.parametrize(
-    "options", [{"gate_probability": 0.0}, {"gate_probability": 1.5}, {"range_bias_length_m": 0.0}]
+    "options",
+    [
+        {"gate_probability": 0.0},
+        {"gate_probability": 1.5},
+        {"range_bias_length_m": 0.0},
+        {"most_alike": 0.9},
+        {"most_alike": math.nan},
+        {"most_alike": math.inf},
+    ],
 )
 def test_impossible_options_are_refused(options):
     with pytest.raises(ParameterError, match="ekf"):

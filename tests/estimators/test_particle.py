@@ -125,7 +125,9 @@ def test_resampling_keeps_mean_and_covariance():
     assert np.allclose(after.std(axis=1), np.sqrt(np.cov(cloud, aweights=weights).diagonal()), rtol=0.03)
 
 
-@pytest.mark.parametrize("options", [{"particles": 0}, {"outlier_share": 0.0}, {"outlier_share": 1.0}])
+@pytest.mark.parametrize(
+    "options", [{"particles": 0}, {"outlier_share": 0.0}, {"outlier_share": 1.0}, {"most_alike": 0.9}]
+)
 def test_impossible_options_are_refused(options):
     with pytest.raises(ParameterError, match="particle"):
         Particle(world(), **options)

@@ -14,10 +14,13 @@ from benchmarks.faults.message_faults import Clock, Delay, Drop, GyroDrop
 from benchmarks.faults.motion_faults import WHEELS, BadStart, Freeze, GyroBias, Kidnap, Slip
 from benchmarks.faults.radio_faults import Nlos, Outlier, PowerStep, RssiNoise
 from benchmarks.lane import run_lane
+from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.score import errors
 from benchmarks.prior import starting_prior
 from fusion import Gyro, MeasurementError, Odometry, ParameterError, Ranges, RssiReading, WheelTicks, WifiScan
 from fusion.drive import Drive
 from fusion.odometry import Odometer
+from fusion.track import order
 from fusion.values import nanoseconds, seconds
 from fusion.world import DRIVES
 from logs.run import Run
@@ -240,7 +243,7 @@ def test_log_truth_and_world_are_never_touched(kind):
     assert faulty.truth is RUN.truth
     assert faulty.world is RUN.world
     changed = {} if kind == "bad_start" else {"prior": RUN.prior}
-    assert replace(faulty, measurements=RUN.measurements, prior=RUN.prior) == RUN
+    assert replace(faulty, measurements=RUN.measurements, prior=RUN.prior, true_stamps={}) == RUN
     assert all(getattr(faulty, name) == value for name, value in changed.items())
 
 
@@ -372,6 +375,33 @@ def test_wrong_clock_shifts_stamps_and_not_the_order_of_arrival():
         elapsed_ns = before.time_ns - START_NS
         ahead_ns = nanoseconds(0.5) + round(1e-3 * elapsed_ns) if isinstance(before, WifiScan) else 0
         assert after == replace(before, time_ns=before.time_ns + ahead_ns)
+
+
+def test_wrong_clock_leaves_the_true_stamps_with_the_run():
+    faulty = struck_by(Clock("wifi", offset_s=0.5), Clock("wifi", offset_s=0.2))
+    assert set(faulty.true_stamps) == {order(m) for m in of_kind(faulty, WifiScan)}
+    assert [faulty.true_stamps[order(m)] for m in of_kind(faulty, WifiScan)] == [
+        m.time_ns for m in of_kind(RUN, WifiScan)
+    ]
+    assert struck_by(Drop("gyro"), run=faulty).true_stamps == faulty.true_stamps
+    assert struck_by(Delay("wifi", 0.3)).true_stamps == {}
+
+
+@pytest.mark.parametrize(
+    ("topic", "offset_s"), [("gyro", 0.4), ("gyro", -0.4), ("wifi", 0.5), ("wifi", -0.5), ("wifi", 1.5)]
+)
+def test_score_is_that_of_the_clean_run_for_who_ignores_the_sensor_with_the_wrong_clock(topic, offset_s):
+    """Odometry alone, its turns from the wheels: answers are as many, as early and as good, whatever clock is wrong."""
+    run = replace(RUN, world=replace(RUN.world, robot=replace(RUN.world.robot, turn_source="wheels")))
+    clean, faulty = (
+        run_lane(told, "dead_reckoning") for told in (run, struck_by(Clock(topic, offset_s=offset_s), run=run))
+    )
+    instants = evaluation_instants(run.truth)
+    expected, got = (errors(instants, match(instants, lane.track)) for lane in (clean, faulty))
+    assert faulty.digest != clean.digest
+    assert np.isfinite(expected.position).all()
+    np.testing.assert_allclose(got.position, expected.position, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(got.nees, expected.nees, rtol=1e-9)
 
 
 def test_increments_still_meet_under_a_wrong_clock():

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from benchmarks.metrics.instants import evaluation_instants, match
 from benchmarks.metrics.track import Track
 from fusion import Covariance, Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, Update
+from fusion.track import order
 from logs.run import TruthTrack
 
 SECOND = 1_000_000_000
@@ -76,6 +77,15 @@ def test_no_answer_comes_from_the_future():
     answers = match(instants, Track.of([update_at(1, 5.0), update_at(SECOND, 6.0), update_at(SECOND + 1, 7.0)]))
     assert answers.valid.tolist() == [False, True]
     assert answers.x[1] == 6.0
+
+
+def test_an_answer_about_a_time_to_come_counts_only_once_that_has_come():
+    """Of a clock half a second ahead: received at once, it neither counts early nor holds up what follows."""
+    instants = evaluation_instants(truth_at([10, 20, 30]), hz=1e9)
+    ahead = [update_at(5, 1.0), update_at(25, 2.0), update_at(10, 3.0)]
+    track = Track.of(ahead, {order(ahead[1].measurement): 6})
+    assert track.received_ns.tolist() == [5, 6, 10]
+    assert match(instants, track).x.tolist() == [3.0, 3.0, 2.0]
 
 
 def test_an_answer_about_the_past_counts_only_once_it_was_received():

@@ -1,0 +1,109 @@
+"""Readings from neighbouring places share the shadowing of the place, and must not count as independent."""
+
+import math
+
+import numpy as np
+import pytest
+
+from estimators.sampling import repeated_variance, total_variance
+from fusion import (
+    Covariance,
+    Odometry,
+    ParameterError,
+    Pose,
+    Prior,
+    RangeReading,
+    Ranges,
+    RssiReading,
+    WifiScan,
+    World,
+    build,
+    sightings,
+    track,
+)
+from fusion.values import NANOSECONDS as SECOND
+
+PLACES = {"a": (-20.0, 3.0), "b": (25.0, -15.0), "c": (3.0, 28.0)}
+RADIO = {"shadowing_std_db": 2.0, "bias_std_db": 3.0, "path_loss_exponent": 2.5}
+QUIET = dict.fromkeys(("distance_scale_std", "turn_scale_std", "turn_bias_std_rad_s"), 0.0)
+START = Prior(0, Pose(0.0, 0.0, 0.0), Covariance.from_std(3.0, 3.0, 0.01))
+FILTERS = pytest.mark.parametrize("name", ["ekf", "filterpy_ekf", "filterpy_ukf", "particle", "bayes_grid"])
+
+
+def world():
+    anchors = [{"id": name, "position_m": list(place)} for name, place in PLACES.items()]
+    return World.from_table({"anchors": anchors, "radio": RADIO, "robot": {"noise": QUIET}})
+
+
+def scan(time_ns, seq):
+    """What the world expects to be heard at the start."""
+    model = world().anchors[0].radio
+    heard = [RssiReading(name, float(model.expected(math.hypot(*place)))) for name, place in PLACES.items()]
+    return WifiScan(time_ns, "wifi", seq, tuple(heard))
+
+
+def spread(name, step_m, scans=40, **options):
+    """Trace of the position's covariance after ``scans``, the robot rocking to and fro by ``step_m`` in between."""
+    told = []
+    for k in range(1, scans + 1):
+        told += [Odometry(k * SECOND, "w", k, (k - 1) * SECOND, step_m * (-1) ** k, 0.0), scan(k * SECOND, k)]
+    place = world()
+    covariance = list(track(build(name, place, options), place, told, START, seed=5))[-1].estimate.covariance
+    return covariance.xx + covariance.yy
+
+
+@pytest.mark.parametrize(("path_m", "times"), [(0.0, 3.0), (0.5, 3.0), (1.0, 2.0), (2.0, 1.0), (9.0, 1.0)])
+def test_common_error_of_neighbouring_signal_strengths_counts_as_often_as_they_share_it(path_m, times):
+    sighting = sightings(world(), scan(0, 0))[0]
+    assert repeated_variance(sighting, path_m, 3.0) == pytest.approx(2.0**2 + times * 3.0**2)
+    assert repeated_variance(sighting, path_m, 1.0) == total_variance(sighting)
+
+
+def test_error_of_a_range_belongs_to_the_radio_and_is_not_counted_by_the_path():
+    sighting = sightings(world(), Ranges(0, "uwb", 0, (RangeReading("a", 20.0),)))[0]
+    assert repeated_variance(sighting, 0.0, 3.0) == total_variance(sighting)
+
+
+@FILTERS
+def test_robot_at_rest_grows_less_certain_of_what_it_hears_again_and_again(name):
+    """Three times the common error at most: the information is that of 2^2 + 3 * 3^2 dB^2 in place of 2^2 + 3^2."""
+    assert spread(name, 0.0) > 1.5 * spread(name, 0.0, most_alike=1.0)
+    assert spread(name, 0.0, most_alike=10.0) > 1.5 * spread(name, 0.0)
+
+
+@FILTERS
+def test_readings_further_apart_than_shadowing_reaches_count_in_full(name):
+    assert spread(name, 2.5) == pytest.approx(spread(name, 2.5, most_alike=1.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["ekf", "filterpy_ekf"])
+def test_information_at_rest_is_that_of_the_inflated_noise(name):
+    """The extended filters add H^T H / R a reading, to first order around the truth, where they stand."""
+    place, scans = world(), 8
+    slopes = [s.expect(0.0, 0.0, 0.0, place.robot.antenna_m) for s in sightings(place, scan(0, 0))]
+    rows = np.array([(slope.by_x, slope.by_y) for slope in slopes])
+    told = [scan(k * SECOND, k) for k in range(1, scans + 1)]
+    start = Prior(0, START.pose, Covariance.from_std(1.0, 1.0, 1e-9))
+    resting = [Odometry(k * SECOND, "w", k, (k - 1) * SECOND, 0.0, 0.0) for k in range(1, scans + 1)]
+    both = [item for pair in zip(resting, told, strict=True) for item in pair]
+    got = list(track(build(name, place), place, both, start))[-1].estimate.covariance
+    information = np.eye(2) + scans * rows.T @ rows / (2.0**2 + 3.0 * 3.0**2)
+    assert np.array(got.matrix)[:2, :2] == pytest.approx(np.linalg.inv(information), rel=1e-2)
+
+
+@pytest.mark.parametrize("name", ["filterpy_ekf", "filterpy_ukf", "particle", "bayes_grid"])
+def test_innovation_keeps_the_variance_of_one_reading(name):
+    """What is repeated makes a reading worth less, not its innovation wider: the gate and NIS stay as they were."""
+    place = world()
+    fates = [
+        next(iter(track(build(name, place, {"most_alike": most}), place, [scan(SECOND, 1)], START))).fates
+        for most in (1.0, 9.0)
+    ]
+    assert [fate.nis for fate in fates[0]] == [fate.nis for fate in fates[1]]
+
+
+@FILTERS
+@pytest.mark.parametrize("most_alike", [0.99, math.nan, math.inf])
+def test_impossible_sharing_is_refused(name, most_alike):
+    with pytest.raises(ParameterError, match="most_alike is"):
+        build(name, world(), {"most_alike": most_alike})
