@@ -15,6 +15,7 @@ import numpy as np
 from fusion import FusionError, Measurement, Ranges, WifiScan
 from fusion.values import seconds
 from logs.bag import open_bag
+from logs.devices import complaints, devices, dropped, wall_clock
 from logs.info_text import info_text
 from logs.reader import holds_run, read_log
 from logs.roles import roles_of
@@ -46,6 +47,10 @@ def describe(path: Path) -> dict[str, Any]:
         "heading_known": run.prior is not None and run.prior.heading_known,
         "estimators": {name: len(estimates) for name, estimates in run.lanes.items()},
         "usability": [verdict.record() for verdict in usability(run)],
+        "wall_clock": wall_clock(run.clocks, _start_ns(log.arrivals)),
+        "devices": devices(run.remarks),
+        "complaints": dict(complaints(run.remarks)),
+        "dropped": dropped(run.remarks),
         "metadata": dict(run.metadata),
         "damage": log.damage.record() if log.damage is not None and str(log.damage) else None,
         "warnings": list(run.warnings),
@@ -102,11 +107,15 @@ def _channels(arrivals: Sequence[tuple[int, Measurement]]) -> list[dict[str, Any
     for log_ns, measurement in arrivals:
         row = (measurement.time_ns, log_ns, measurement.seq)
         by_sensor[type(measurement).__name__, measurement.sensor].append(row)
-    start_ns = min((measurement.time_ns for _, measurement in arrivals), default=0)
+    start_ns = _start_ns(arrivals)
     return [
         {"kind": kind, "sensor": sensor, **Stream(*np.array(rows, dtype=np.int64).T).timing(start_ns)}
         for (kind, sensor), rows in sorted(by_sensor.items())
     ]
+
+
+def _start_ns(arrivals: Sequence[tuple[int, Measurement]]) -> int:
+    return min((measurement.time_ns for _, measurement in arrivals), default=0)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -49,11 +49,25 @@ def _log(about: Facts) -> Iterator[str]:
     for row in about["channels"]:
         head = f"  {row['kind']:<12} {row['sensor']:<12} {row['count']:>7}  {_rate(row['rate_hz']):>10}"
         yield f"{head}  {', '.join(_oddities(row))}"
+    yield from _recording(about)
     yield f"truth: {about['truth']} poses" if about["truth"] else "truth: none, so errors cannot be scored"
     yield f"start: {_start(about)}"
     yield from (f"estimates of {name}: {count}" for name, count in about["estimators"].items())
     yield "estimators that could use it, by their tags and a short replay:"
     yield from map(_usability, about["usability"])
+
+
+def _recording(about: Facts) -> Iterator[str]:
+    """What a recorder told of its clock and its devices; nothing of logs that come from elsewhere."""
+    if clock := about["wall_clock"]:
+        yield f"began {clock['began']}{'' if clock['synced'] else ' by a wall clock that nobody keeps right'}"
+        yield from (f"the wall clock stepped by {s['by_s']:+.2f} s at {s['at_s']:.1f} s" for s in clock["steps"])
+        if clock["suspended_s"] >= 1.0:
+            yield f"the computer was suspended for {clock['suspended_s']:.0f} s"
+    for sensor, told in about["devices"].items():
+        yield f"  {sensor} is a {told.get('model', 'device')} {told.get('firmware', '')}".rstrip()
+    yield from (f"  {text} ({count} times)" for text, count in about["complaints"].items())
+    yield from (f"  {sensor}: the recorder dropped {count} messages" for sensor, count in about["dropped"].items())
 
 
 def _oddities(row: Facts) -> Iterator[str]:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from fusion import BootClock, Clock, DeviceInfo, Level, LogError, NotFoundError, Remark
 from fusion.values import nanoseconds, seconds
+from logs.devices import STATUS
 from sensors.computer import tell_service_manager
 from sensors.keeper import Keeper, Received, State
 from sensors.robot_file import RobotFile, build_driver
@@ -148,4 +149,4 @@ def _as_remark(status: Status, now_ns: int) -> Remark:
     values = [(key, str(value)) for key, value in status._asdict().items() if value not in (None, "")]
     level = {State.RUNNING: Level.OK, State.FAILED: Level.ERROR}.get(status.state, Level.WARN)
     named = dict(values) | {"state": status.state.value}
-    return Remark(now_ns, status.name, level, "status", tuple(named.items()))
+    return Remark(now_ns, status.name, level, STATUS, tuple(named.items()))
