@@ -29,6 +29,7 @@ VERBS = {
     "import": Verb("logs.importing", "turn a recording of another format into an MCAP log"),
     "export": Verb("logs.export", "turn a log into CSV or TUM files"),
     "info": Verb("logs.info", "what is in a log"),
+    "calibrate": Verb("benchmarks.calibration.calibrate", "the numbers of radio, wheels and gyro from recorded runs"),
     "bound": Verb("benchmarks.sites.site", "the least error a fix can have over a floor, and where an anchor helps"),
     "bench": Verb("benchmarks.bench", "score estimators on recorded runs"),
     "replay": Verb("benchmarks.replay", "run one estimator over a log and record what it said"),
@@ -49,6 +50,11 @@ GROUPS = {
         "gate": Verb("benchmarks.runner.gate_verb", "may a change land? judged against a baseline"),
         "verify": Verb("benchmarks.runner.verify_verb", "compute stored cells again, they must be the same"),
         "export": Verb("benchmarks.runner.export_verb", "results for other programs"),
+    },
+    "calibrate": {
+        "radio": Verb("benchmarks.calibration.radio_verb", "path loss and shadowing, bias and scale of ranges"),
+        "odometry": Verb("benchmarks.calibration.odometry_verb", "scale of either side and the effective track"),
+        "gyro": Verb("benchmarks.calibration.gyro_verb", "bias, its drift, scale and noise"),
     },
 }
 """Verbs under verbs; without one of them the verb itself is meant (`fusion bench RUN`)."""
