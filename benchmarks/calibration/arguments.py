@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -63,7 +64,9 @@ def calibrate(arguments: argparse.Namespace, find: Callable[[list[Run]], Finding
         print_sheets(found.sheets)
     if arguments.json is not None:
         told = {"calibrates": found.name, "remarks": list(found.remarks), "changes": found.changes}
-        write_json(arguments.json, record({**told, "anchors": found.anchors, "result": found.result, "about": about}))
+        write_json(
+            arguments.json, record({**told, "anchors": found.anchors, "result": found.result, "about": asdict(about)})
+        )
     if arguments.png is not None:
         write(arguments.png, as_png(found.draw()))
     if arguments.output is not None and found.changes is not None:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.calibration.held_out import Interval
-from benchmarks.calibration.readings import Readings
+from benchmarks.calibration.readings import Readings, extent_m
 from benchmarks.metrics.track import Flags, Floats, Whole
 from fusion import LogError
 
@@ -228,7 +228,7 @@ def _blocks(told: Spots, length_m: float, share: float) -> list[tuple[Whole, Flo
 
 def _correlation(told: Spots, design: Floats, left: Floats) -> tuple[float, float]:
     """The likeliest length [m], up to as long as the floor, and share."""
-    extent = max(float(np.hypot(np.ptp(told.x), np.ptp(told.y))), 1e-3)
+    extent = max(extent_m(told.x, told.y), 1e-3)
     tried = [(float(length), share) for length in np.geomspace(0.02 * extent, extent, LENGTHS) for share in SHARES[:-1]]
     return min([*tried, (extent, 1.0)], key=lambda pair: _likelihood(_blocks(told, *pair), design, left)[0])
 

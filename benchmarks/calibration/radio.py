@@ -15,6 +15,7 @@ from benchmarks.calibration.design import Advice, next_places
 from benchmarks.calibration.held_out import BeforeAfter, Interval, root_mean_square
 from benchmarks.calibration.line import LEAST_PLACES, Estimate, Line, Spots, fit_line, spots
 from benchmarks.calibration.readings import KINDS, UNITS, Kind, Readings, gather, model_of
+from benchmarks.metrics.score import quantile
 from benchmarks.metrics.track import Flags, Floats, Whole
 from fusion import LogError, World
 from fusion.radio import DistanceModel, PathLoss, Ranging
@@ -116,7 +117,7 @@ def _scores(world: World, kind: Kind, readings: Readings) -> list[BeforeAfter]:
         )
         for name, share in (("median", 0.5), ("p95", 0.95)):
             told = f"{what} left out: distance from one reading, {name}"
-            scores.append(BeforeAfter(told, "m", size, *(float(np.quantile(np.abs(e), share)) for e in (was_m, now_m))))
+            scores.append(BeforeAfter(told, "m", size, *(quantile(np.abs(error), share) for error in (was_m, now_m))))
     return scores
 
 
@@ -135,18 +136,18 @@ def _left_out(world: World, kind: Kind, readings: Readings, fold: Whole) -> tupl
 
 
 def _errors(world: World, kind: Kind, readings: Readings, line: Estimate | None) -> tuple[Floats, Floats]:
-    """Reading minus expected, and distance told by the reading minus the true one [m]; ``line`` None: by the world."""
+    """Reading minus expected, and distance told by the reading minus the true one [m], infinite where the line does not
+    fall with distance; ``line`` None: by the world.
+    """
     found = np.empty((2, len(readings.value)))
     for i, anchor in enumerate(world.anchors):
         rows, model = readings.anchor == i, model_of(anchor, kind)
         if line is not None:
             level = line.level if math.isnan(line.levels[i]) else float(line.levels[i])
             model = calibrated(model, line.gain, level)
-        if rows.any() and _gain(model) > 0.0:
-            found[0, rows] = readings.value[rows] - model.expected(readings.distance_m[rows])
-            found[1, rows] = model.distance(readings.value[rows]) - readings.distance_m[rows]
-        elif rows.any():
-            found[:, rows] = np.inf
+        found[0, rows] = readings.value[rows] - model.expected(readings.distance_m[rows])
+        away = model.distance(readings.value[rows]) if _gain(model) > 0.0 else np.inf
+        found[1, rows] = away - readings.distance_m[rows]
     return found[0], found[1]
 
 

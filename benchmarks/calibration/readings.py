@@ -170,13 +170,17 @@ def places(x: Floats, y: Floats, radius_m: float | None = None) -> tuple[Whole, 
 
     In the order of time, so neighbours in number are neighbours on the path; turning the floor changes nothing.
     """
-    extent = math.hypot(float(np.ptp(x)), float(np.ptp(y)))
-    radius = min(PLACE_M, max(extent / PLACES_ACROSS, 0.01)) if radius_m is None else radius_m
+    radius = min(PLACE_M, max(extent_m(x, y) / PLACES_ACROSS, 0.01)) if radius_m is None else radius_m
     while True:
         place = _leaders(x, y, radius)
         if radius_m is not None or place.max(initial=0) < MOST_PLACES:
             return place, radius
         radius *= 2.0
+
+
+def extent_m(x: Floats, y: Floats) -> float:
+    """Diameter [m] of the disc about the mean position that holds all: the same however the floor is turned."""
+    return 2.0 * float(np.hypot(x - x.mean(), y - y.mean()).max())
 
 
 def _leaders(x: Floats, y: Floats, radius_m: float) -> Whole:

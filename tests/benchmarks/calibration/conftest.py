@@ -56,7 +56,9 @@ def _rssi_run(points, values, *, world=None, turned=0.0, each=5):
         {**row, "position_m": [*(spin @ row["position_m"][:2]).tolist(), row["position_m"][2]]}
         for row in (world or ANCHORS)
     ]
-    place = World.from_table({"anchors": anchors, "bounds": dict(x_min=-20.0, x_max=20.0, y_min=-20.0, y_max=20.0)})
+    place = World.from_table(
+        {"anchors": anchors, "bounds": {"x_min": -20.0, "x_max": 20.0, "y_min": -20.0, "y_max": 20.0}}
+    )
     scans, truths = [], []
     for i, (point, heard) in enumerate(zip(np.asarray(points) @ spin.T, values, strict=True)):
         for k in range(each):

@@ -177,7 +177,7 @@ def test_segments_are_measured_by_hand_too(drive, tmp_path):
 
 
 def test_nothing_is_scored_that_was_fitted(drive):
-    """Each half is judged by the other: a half that is spoiled makes its own score bad, and leaves the fit to it good."""
+    """Each half is judged by the other: a half that is spoiled makes both scores bad."""
     run = drive(laps=2, slip_std=0.0)
     told = wheels(run)
     pieces = rolled(find_segments(run, 0, told), [told], run.world.robot)
