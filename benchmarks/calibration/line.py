@@ -17,49 +17,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.calibration.correlation import blocks, find_correlation, likelihood
 from benchmarks.calibration.held_out import Interval
-from benchmarks.calibration.readings import Readings, extent_m
-from benchmarks.metrics.track import Flags, Floats, Whole
+from benchmarks.calibration.spots import NORMAL, Spots
+from benchmarks.metrics.track import Floats, Whole
 from fusion import LogError
 
 HUBER = 1.345
 """Residuals beyond so many standard deviations count linearly: 95 % efficient where all is Gaussian."""
-NORMAL = 1.4826
-"""Standard deviation over median absolute deviation of a Gaussian."""
 ITERATIONS = 50
 LEAST_PLACES = 4
 LEAST_SPREAD = 1e-3
-LENGTHS, SHARES = 10, (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-"""How many correlation lengths, and which shares of uncorrelated variance, are tried."""
-
-
-class Spots(NamedTuple):
-    """One row (n,) for each anchor and place: columns as in `Readings`, ``size``: how many readings it is.
-
-    ``scatter``: standard deviation of single readings about their own spot, robust, in the reading's unit.
-    """
-
-    anchor: Whole
-    place: Whole
-    value: Floats
-    gain: Floats
-    x: Floats
-    y: Floats
-    size: Whole
-    scatter: float
-
-    def at(self, rows: Flags) -> Spots:
-        """Some of them; the scatter stays."""
-        return Spots(
-            self.anchor[rows],
-            self.place[rows],
-            self.value[rows],
-            self.gain[rows],
-            self.x[rows],
-            self.y[rows],
-            self.size[rows],
-            self.scatter,
-        )
 
 
 class Estimate(NamedTuple):
@@ -130,23 +98,6 @@ class Line(NamedTuple):
         )
 
 
-def spots(readings: Readings, slope: float) -> Spots:
-    """Readings of one anchor at one place together: medians about a line of ``slope``, told at their mean gain."""
-    key = readings.anchor * (int(readings.place.max()) + 1) + readings.place
-    _, first, row, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
-    order = np.argsort(row, kind="stable")
-    groups = np.split(order, np.cumsum(count)[:-1])
-    level = readings.value - slope * readings.gain
-    middle = np.array([np.median(level[group]) for group in groups])
-    gain, x, y = (
-        np.array([column[group].mean() for group in groups]) for column in (readings.gain, readings.x, readings.y)
-    )
-    left = np.abs(level - middle[row])[count[row] > 1]
-    fair = math.sqrt(float(count[count > 1].sum()) / max(float((count[count > 1] - 1).sum()), 1.0))
-    scatter = NORMAL * fair * float(np.median(left)) if len(left) else 0.0
-    return Spots(readings.anchor[first], readings.place[first], middle + slope * gain, gain, x, y, count, scatter)
-
-
 def fit_line(told: Spots, anchors: int, correlation: tuple[float, float] | None = None) -> Line:
     """All anchors together, one gain and a level each; ``correlation`` (length [m], share) None: found.
 
@@ -157,13 +108,13 @@ def fit_line(told: Spots, anchors: int, correlation: tuple[float, float] | None 
     left = (told.value - design @ numbers) / scale
     inside = float(np.mean(np.abs(left) <= HUBER))
     pseudo = scale * np.clip(left, -HUBER, HUBER) / max(inside, 0.1)
-    length, share = correlation or _correlation(told, design, pseudo)
-    blocks = _blocks(told, length, share)
-    variance = _likelihood(blocks, design, pseudo)[1]
+    length, share = correlation or find_correlation(told, design, pseudo)
+    parts = blocks(told, length, share)
+    variance = likelihood(parts, design, pseudo)[1]
     bread = np.linalg.inv(design.T @ design)
-    meat = sum(design[rows].T @ alike @ design[rows] for rows, alike in blocks)
+    meat = sum(design[rows].T @ alike @ design[rows] for rows, alike in parts)
     levels, covariance = _levels(numbers, heard, anchors), variance * bread @ meat @ bread
-    effective = sum(len(alike) ** 2 / float(alike.sum()) for _, alike in blocks)
+    effective = sum(len(alike) ** 2 / float(alike.sum()) for _, alike in parts)
     return Line(float(numbers[0]), levels, covariance, scale, length, share, effective, len(told.value))
 
 
@@ -214,36 +165,3 @@ def _huber(design: Floats, values: Floats) -> tuple[Floats, float]:
             return changed, scale
         numbers = changed
     return numbers, scale
-
-
-def _blocks(told: Spots, length_m: float, share: float) -> list[tuple[Whole, Floats]]:
-    """Rows of each anchor and the correlation matrix of what is left of them; anchors know nothing of each other."""
-    found = []
-    for anchor in np.unique(told.anchor):
-        rows = np.flatnonzero(told.anchor == anchor)
-        away = np.hypot(np.subtract.outer(told.x[rows], told.x[rows]), np.subtract.outer(told.y[rows], told.y[rows]))
-        found.append((rows, (1.0 - share) * np.exp(-away / length_m) + share * np.eye(len(rows))))
-    return found
-
-
-def _correlation(told: Spots, design: Floats, left: Floats) -> tuple[float, float]:
-    """The likeliest length [m], up to as long as the floor, and share."""
-    extent = max(extent_m(told.x, told.y), 1e-3)
-    tried = [(float(length), share) for length in np.geomspace(0.02 * extent, extent, LENGTHS) for share in SHARES[:-1]]
-    return min([*tried, (extent, 1.0)], key=lambda pair: _likelihood(_blocks(told, *pair), design, left)[0])
-
-
-def _likelihood(blocks: list[tuple[Whole, Floats]], design: Floats, left: Floats) -> tuple[float, float]:
-    """Minus twice the restricted log-likelihood, its variance profiled out, and that variance."""
-    size = design.shape[1]
-    normal, moment, square, logs = np.zeros((size, size)), np.zeros(size), 0.0, 0.0
-    for rows, alike in blocks:
-        root = np.linalg.cholesky(alike + 1e-9 * np.eye(len(rows)))
-        own = np.linalg.solve(root, np.column_stack([design[rows], left[rows]]))
-        normal += own[:, :-1].T @ own[:, :-1]
-        moment += own[:, :-1].T @ own[:, -1]
-        square += float(own[:, -1] @ own[:, -1])
-        logs += 2.0 * float(np.log(np.diag(root)).sum())
-    freedom = len(left) - size
-    variance = max(float(square - moment @ np.linalg.solve(normal, moment)) / freedom, 1e-18)
-    return logs + float(np.linalg.slogdet(normal)[1]) + freedom * math.log(variance), variance

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.calibration.arcs import Roll
-from benchmarks.calibration.odometry import Rolled, Trend, residuals
+from benchmarks.calibration.odometry import residuals
+from benchmarks.calibration.rolled import Rolled, Trend
 from benchmarks.colours import BLUE, VERMILLION
 from benchmarks.metrics.track import Floats
 from benchmarks.plotting import label, panels, plain

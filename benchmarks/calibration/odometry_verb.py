@@ -15,16 +15,13 @@ from benchmarks.calibration.arcs import Roll
 from benchmarks.calibration.arguments import Findings, calibrate, configure_common
 from benchmarks.calibration.held_out import BeforeAfter, Interval, sheet
 from benchmarks.calibration.odometry import (
-    Rolled,
     RollFit,
-    Trend,
     fit_roll,
-    linear_trend,
     residuals,
-    rolled,
     score_held_out,
 )
 from benchmarks.calibration.odometry_picture import draw
+from benchmarks.calibration.rolled import Rolled, Trend, linear_trend, rolled
 from benchmarks.calibration.segments import find_segments, read_segments
 from benchmarks.calibration.umbmark import Square, Umbmark, find_squares, judge
 from benchmarks.calibration.wheels import Wheels, nominal, wheels

@@ -13,8 +13,9 @@ import numpy as np
 
 from benchmarks.calibration.design import Advice, next_places
 from benchmarks.calibration.held_out import BeforeAfter, Interval, root_mean_square
-from benchmarks.calibration.line import LEAST_PLACES, Estimate, Line, Spots, fit_line, spots
+from benchmarks.calibration.line import LEAST_PLACES, Estimate, Line, fit_line
 from benchmarks.calibration.readings import KINDS, UNITS, Kind, Readings, gather, model_of
+from benchmarks.calibration.spots import Spots, spots
 from benchmarks.metrics.score import quantile
 from benchmarks.metrics.track import Flags, Floats, Whole
 from fusion import LogError, World

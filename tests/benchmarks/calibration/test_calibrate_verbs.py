@@ -1,12 +1,19 @@
 """The command line: what is printed, written and refused; a world file keeps what is not calibrated."""
 
+import dataclasses
 import json
 import tomllib
 
+import numpy as np
 import pytest
 
-from benchmarks.calibration.world_file import calibrated_text
-from fusion import World
+from benchmarks.calibration.odometry_verb import findings as odometry_findings
+from benchmarks.calibration.radio_verb import findings as radio_findings
+from benchmarks.calibration.world_file import calibrated_text, world_text
+from benchmarks.lane import run_lane
+from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.track import Track
+from fusion import Truth, World
 from fusion.cli import main
 from fusion.world import Calibration
 from logs.writer import RunWriter
@@ -40,8 +47,6 @@ def log(drive, tmp_path_factory):
     with RunWriter(path, run.world, name="drive", prior=run.prior) as writer:
         for measurement in run.measurements:
             writer.write(measurement)
-        from fusion import Truth
-
         for truth in zip(run.truth.time_ns, run.truth.x, run.truth.y, run.truth.heading, strict=True):
             writer.write_truth(Truth(int(truth[0]), *map(float, truth[1:])))
     return path
@@ -95,6 +100,31 @@ def test_json_alone_goes_to_stdout(log, capsys):
     told = json.loads(capsys.readouterr().out)
     assert told["result"]["held_out"]
     assert told["about"]["logs"] == ["drive.mcap"]
+
+
+def test_an_estimator_is_better_for_it_on_another_drive(drive):
+    """Anchors off by some 6 dB and wheels that are wrong: calibrated on one route, driven on another."""
+    reality = {"wifi_hz": 2.0, "distance_scale_bias": 0.05, "track_scale_bias": 0.08, "anchor_offset_std_db": 6.0}
+    errors = []
+    for seed in range(3):
+        places = [[1.0, 1.0], [11.0, 1.0], [11.0, 8.0], [1.0, 8.0], [1.0, 1.0], [6.0, 4.5], [11.0, 8.0], [6.0, 1.0]]
+        first = drive(seed, waypoints=[*places, [1.0, 8.0], [6.0, 8.0], [3.0, 2.0], [9.0, 3.0], [1.0, 1.0]], **reality)
+        other = drive(seed, waypoints=[[2.0, 2.0], [10.0, 7.0], [2.0, 7.0], [10.0, 2.0], [2.0, 2.0]], **reality)
+        text = world_text(first.world, None)
+        for found in (radio_findings([first]), odometry_findings([first])):
+            text = calibrated_text(text, found.changes, found.anchors, found.name, RECORD)
+        runs = other, dataclasses.replace(other, world=World.from_toml(text))
+        errors.append([rmse(run) for run in runs])
+    before, after = np.median(errors, axis=0)
+    assert after < 0.6 * before
+
+
+def rmse(run):
+    """Of the EKF [m]."""
+    instants = evaluation_instants(run.truth)
+    said = match(instants, Track.of(run_lane(run, "ekf", seed=0).updates))
+    assert said.valid.mean() > 0.9
+    return float(np.sqrt(np.nanmean(np.square(said.x - instants.x) + np.square(said.y - instants.y))))
 
 
 @pytest.mark.parametrize(

@@ -12,11 +12,10 @@ from benchmarks.calibration.arcs import Roll, arc_end
 from benchmarks.calibration.odometry import (
     fit_roll,
     halves,
-    linear_trend,
-    rolled,
     score_held_out,
 )
 from benchmarks.calibration.odometry_verb import calibrate_odometry
+from benchmarks.calibration.rolled import linear_trend, rolled
 from benchmarks.calibration.segments import SPIN, STRAIGHT, find_segments, read_segments
 from benchmarks.calibration.umbmark import umbmark
 from benchmarks.calibration.wheels import wheels
