@@ -15,6 +15,7 @@ from benchmarks.calibration.world_file import Table, calibrated_text, world_text
 from benchmarks.output import require_place, write, write_json
 from benchmarks.plotting import as_png, require_matplotlib
 from benchmarks.sheet import Sheet, print_sheets
+from fusion import LogError
 from logs.run import Run
 
 if TYPE_CHECKING:
@@ -69,7 +70,9 @@ def calibrate(arguments: argparse.Namespace, find: Callable[[list[Run]], Finding
         )
     if arguments.png is not None:
         write(arguments.png, as_png(found.draw()))
-    if arguments.output is not None and found.changes is not None:
+    if arguments.output is not None:
+        if found.changes is None:
+            raise LogError(f"{arguments.output}: not written, for these logs cannot calibrate a world; see above why")
         text = world_text(runs[0].world, arguments.world)
         write_world(arguments.output, calibrated_text(text, found.changes, found.anchors, found.name, about))
     return 0

@@ -178,7 +178,7 @@ def _remarks(found: OdometryCalibration) -> list[str]:
     if found.ready_made:
         told.append(
             "the log holds ready-made increments and no ticks, which a world's wheels do not touch: correct the driver "
-            "by these numbers; no world is written"
+            "by these numbers"
         )
     if found.squares and found.umbmark is None:
         told.append("UMBmark needs squares in both senses, and lines and turns outside of them")

@@ -60,7 +60,7 @@ def rates(run: Run) -> Rates:
         (m.time_ns, m.rate_rad_s) for m in run.measurements if isinstance(m, Gyro) and math.isfinite(m.rate_rad_s)
     )
     if len(told) < 2:
-        raise LogError(f"{run.path}: holds no gyro; record one with turn_source or driver for it")
+        raise LogError(f"{run.path}: holds no gyro; record a run with the gyro on")
     time_ns, first = np.unique(np.array([time for time, _ in told], dtype=np.int64), return_index=True)
     rate = np.array([rate for _, rate in told])[first]
     steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(time_ns) / NANOSECONDS

@@ -15,6 +15,7 @@ from benchmarks.metrics.instants import evaluation_instants, match
 from benchmarks.metrics.track import Track
 from fusion import Truth, World
 from fusion.cli import main
+from fusion.odometry import Odometer
 from fusion.world import Calibration
 from logs.writer import RunWriter
 
@@ -47,9 +48,13 @@ def log(drive, tmp_path_factory):
     with RunWriter(path, run.world, name="drive", prior=run.prior) as writer:
         for measurement in run.measurements:
             writer.write(measurement)
-        for truth in zip(run.truth.time_ns, run.truth.x, run.truth.y, run.truth.heading, strict=True):
-            writer.write_truth(Truth(int(truth[0]), *map(float, truth[1:])))
+        write_truth(writer, run)
     return path
+
+
+def write_truth(writer, run):
+    for time_ns, *pose in zip(run.truth.time_ns, run.truth.x, run.truth.y, run.truth.heading, strict=True):
+        writer.write_truth(Truth(int(time_ns), *map(float, pose)))
 
 
 @pytest.mark.parametrize("sensor", ["radio", "odometry", "gyro"])
@@ -93,6 +98,26 @@ def test_an_anchors_own_key_does_not_hide_what_was_fitted_for_all():
     )
     assert {anchor.radio.path_loss_exponent for anchor in World.from_toml(text).anchors} == {2.2}
     assert tomllib.loads(text)["calibration"]["radio"]["samples"] == 3
+
+
+def test_ready_made_increments_are_judged_and_fill_no_world(drive, tmp_path, capsys):
+    """What a robot's own computer made of its ticks: the world's wheels do not touch it."""
+    run = drive(laps=2, distance_scale_bias=0.03)
+    odometer, path = Odometer(run.world.robot), tmp_path / "made.mcap"
+    state = odometer.start(run.measurements[0].time_ns)
+    with RunWriter(path, run.world, name="made") as writer:
+        for ticks in run.measurements:
+            state, motion = odometer.advance(state, ticks)
+            for step in motion:
+                writer.write(step)
+        write_truth(writer, run)
+    output = tmp_path / "world.toml"
+    assert main(["calibrate", "odometry", str(path), "-o", str(output)]) == 1
+    said = capsys.readouterr()
+    assert "0.97" in said.out
+    assert "correct the driver" in said.err
+    assert "not written" in said.err
+    assert not output.exists()
 
 
 def test_json_alone_goes_to_stdout(log, capsys):
