@@ -5,7 +5,7 @@ from __future__ import annotations
 from io import BytesIO
 from typing import TYPE_CHECKING
 
-from benchmarks.colours import colour_of
+from benchmarks.colours import Colour, colour_of
 from fusion import FusionError
 
 if TYPE_CHECKING:
@@ -60,7 +60,12 @@ def plain_ticks(axis: Axis, subs: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
 
 def plain_colour(estimator: str) -> tuple[float, float, float]:
     """The estimator's colour in every picture, from 0 to 1."""
-    red, green, blue = colour_of(estimator)
+    return plain(colour_of(estimator))
+
+
+def plain(colour: Colour) -> tuple[float, float, float]:
+    """A colour of the review, from 0 to 1."""
+    red, green, blue = colour
     return red / 255.0, green / 255.0, blue / 255.0
 
 

@@ -34,6 +34,7 @@ VERBS = {
     "export": Verb("logs.export", "turn a log into CSV or TUM files"),
     "info": Verb("logs.info", "what is in logs, what is odd about them, and which estimators could use them"),
     "repair": Verb("logs.repair", "a log that a crash cut off, made whole again"),
+    "calibrate": Verb("benchmarks.calibration.calibrate", "the numbers of radio, wheels and gyro from recorded runs"),
     "bound": Verb("benchmarks.sites.site", "the least error a fix can have over a floor, and where an anchor helps"),
     "bench": Verb("benchmarks.bench", "score estimators on recorded runs"),
     "replay": Verb("benchmarks.replay", "run one estimator over a log and record what it said"),
@@ -57,6 +58,11 @@ GROUPS = {
         "export": Verb("benchmarks.runner.export_verb", "results for other programs"),
     },
     "sensors": {"test": Verb("sensors.self_test", "run every sensor of a robot for a while: a report to attach")},
+    "calibrate": {
+        "radio": Verb("benchmarks.calibration.radio_verb", "path loss and shadowing, bias and scale of ranges"),
+        "odometry": Verb("benchmarks.calibration.odometry_verb", "scale of either side and the effective track"),
+        "gyro": Verb("benchmarks.calibration.gyro_verb", "bias, its drift, scale and noise"),
+    },
 }
 """Verbs under verbs; without one of them the verb itself is meant (`fusion bench RUN`)."""
 

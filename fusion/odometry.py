@@ -60,8 +60,9 @@ def wheel_increment(robot: Robot, rolled_m: Sequence[float]) -> tuple[float, flo
     Both sides are averaged; four skid-steered wheels act as two at the effective track width
     (Borenstein et al. 1997, section 1.2).
     """
-    left = sum(rolled_m[0::2]) / len(rolled_m[0::2])
-    right = sum(rolled_m[1::2]) / len(rolled_m[1::2])
+    left_scale, right_scale = robot.side_scales
+    left = left_scale * sum(rolled_m[0::2]) / len(rolled_m[0::2])
+    right = right_scale * sum(rolled_m[1::2]) / len(rolled_m[1::2])
     return 0.5 * (left + right), (right - left) / robot.track_width_m
 
 
@@ -216,7 +217,7 @@ class Odometer:
     def _gyro(self, state: OdometerState, gyro: Gyro) -> tuple[OdometerState, tuple[Measurement, ...]]:
         if self.robot.turn_source != "gyro":
             return state, (gyro,)
-        rate, before = gyro.rate_rad_s - self.robot.gyro_bias_rad_s, state.gyro
+        rate, before = self.robot.gyro_scale * (gyro.rate_rad_s - self.robot.gyro_bias_rad_s), state.gyro
         if before is None:
             first = _GyroAngle(gyro.time_ns, 0.0, rate)
             return state._replace(gyro=first, gyro_angle_at_last=first.at(state.last_ns)), ()

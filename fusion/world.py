@@ -74,8 +74,11 @@ class Robot:
     track_width_m: float = 0.15
     distance_scale: float = 1.0
     distance_offset_m: float = 0.0
+    diameter_ratio: float = 1.0
+    """Right wheels over left, the mean of both kept: E_d of Borenstein & Feng (1996)."""
     turn_source: str = "wheels"
     gyro_bias_rad_s: float = 0.0
+    gyro_scale: float = 1.0
     antenna_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     noise: OdometryNoise = field(default_factory=OdometryNoise)
 
@@ -83,6 +86,27 @@ class Robot:
     def distance_per_tick_m(self) -> float:
         """Distance a wheel rolls from one tick to the next [m]."""
         return self.wheel_circumference_m / self.ticks_per_revolution
+
+    @property
+    def side_scales(self) -> tuple[float, float]:
+        """Factors of the left and the right wheels' roll, whose mean is one (Borenstein & Feng 1996, eqs. 17, 18)."""
+        return 2.0 / (1.0 + self.diameter_ratio), 2.0 * self.diameter_ratio / (1.0 + self.diameter_ratio)
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Where calibrated numbers of a world come from, for people and reports; no estimator reads it.
+
+    ``recorded``: date of the newest log, by its own stamps. ``residual_std`` of the ``samples``, in their own unit.
+    """
+
+    method: str
+    logs: tuple[str, ...]
+    sha256: tuple[str, ...]
+    recorded: str
+    samples: int
+    residual_std: float
+    fusion: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +133,8 @@ class World:
     bounds: Bounds
     walls: tuple[Wall, ...]
     provenance: str
+    calibration: Mapping[str, Calibration]
+    """By what was calibrated: ``radio``, ``odometry``, ``gyro`` ..."""
     hash: str
     """SHA-256 of the world's content, whatever the order or spelling of its keys."""
     table: str = field(repr=False)
@@ -140,7 +166,7 @@ class World:
         import hashlib
         import json
 
-        known = {"name", "provenance", "anchors", "radio", "ranging", "robot", "bounds", "walls"}
+        known = {"name", "provenance", "anchors", "radio", "ranging", "robot", "bounds", "walls", "calibration"}
         check_keys(table, dict.fromkeys(known), "world")
         robot = read_record(Robot, table.get("robot", {}), "robot")
         _check_robot(robot)
@@ -151,6 +177,7 @@ class World:
         name = read_value(str, table.get("name", "unnamed"), "name")
         walls = read_value(tuple[Wall, ...], table.get("walls", ()), "walls")
         provenance = read_value(str, table.get("provenance", ""), "provenance")
+        calibration = read_value(Mapping[str, Calibration], table.get("calibration", {}), "calibration")
         # Only now: every value is known to be one that JSON can tell (TOML also has dates).
         text = json.dumps(table, sort_keys=True, separators=(",", ":"))
         return cls(
@@ -160,6 +187,7 @@ class World:
             bounds=bounds,
             walls=walls,
             provenance=provenance,
+            calibration=calibration,
             hash=hashlib.sha256(text.encode()).hexdigest(),
             table=text,
         )
@@ -239,7 +267,16 @@ def _check_robot(robot: Robot) -> None:
         if getattr(robot, key) not in allowed:
             raise WorldError(f"robot.{key}: {getattr(robot, key)!r} is none of {', '.join(allowed)}")
     _require_positive(
-        robot, ("ticks_per_revolution", "wheel_circumference_m", "track_width_m", "distance_scale"), "robot"
+        robot,
+        (
+            "ticks_per_revolution",
+            "wheel_circumference_m",
+            "track_width_m",
+            "distance_scale",
+            "diameter_ratio",
+            "gyro_scale",
+        ),
+        "robot",
     )
     for key in (item.name for item in dataclasses.fields(robot.noise)):
         if getattr(robot.noise, key) < 0:

@@ -140,7 +140,8 @@ class SimulatedRobot:
         blocks = -(-len(moments) // SLIP_STEPS)
         slip = self._streams["slip"].normal(0.0, self.scenario.reality.slip_std, (blocks, 2))
         slip = np.repeat(slip, SLIP_STEPS, axis=0)[: len(moments)]
-        turned = np.stack([ahead - sideways, ahead + sideways], axis=1) * STEP_S * self._roll_scale * (1.0 + slip)
+        sides = np.stack([ahead - sideways, ahead + sideways], axis=1) / np.array(robot.side_scales)
+        turned = sides * STEP_S * self._roll_scale * (1.0 + slip)
         return np.asarray(np.cumsum(np.abs(turned) if self._single_channel else turned, axis=0))
 
     def _turn_rates(self, moments: tuple[Moment, ...]) -> Steps:
@@ -162,7 +163,7 @@ class SimulatedRobot:
             yield WheelTicks(time_ns, "encoders", step, (left, right) * (DRIVES[robot.drive] // 2))
         if "gyro" in due:
             noise = self._streams["gyro"].normal(0.0, self.scenario.reality.gyro_noise_std_rad_s)
-            yield Gyro(time_ns, "gyro", step, float(turn_rate + self._gyro_bias + noise))
+            yield Gyro(time_ns, "gyro", step, float(turn_rate / robot.gyro_scale + self._gyro_bias + noise))
         if "wifi" in due:
             yield self._scan(step, moment, 1)
         if "ranges" in due:

@@ -43,7 +43,7 @@ from fusion import (
 )
 from fusion.cli import main
 from fusion.drive import Drive
-from fusion.odometry import Odometer
+from fusion.odometry import Odometer, wheel_increment
 from fusion.radio import PathLoss, Ranging, free_space_loss_db
 from fusion.trilateration import closed_form, least_squares, trilaterate
 from fusion.values import nanoseconds
@@ -225,6 +225,22 @@ def test_single_channel_encoders_take_their_sign_from_the_command():
     _, (motion,) = odometer.advance(state, WheelTicks(SECOND, "e", 1, (2, 2)))
     assert motion.distance_m == pytest.approx(0.0)
     assert motion.turn_rad == pytest.approx(2 * 2 * 0.0102 / 0.15)
+
+
+def test_wheels_of_two_sizes_are_told_apart_and_their_mean_is_kept():
+    """Borenstein & Feng: with the right wheel 2 % larger, equal counts are a left turn over the same distance."""
+    distance, turn = wheel_increment(Robot(drive="differential", track_width_m=0.5, diameter_ratio=1.02), (1.0, 1.0))
+    assert distance == pytest.approx(1.0)
+    assert turn == pytest.approx(2.0 * 0.02 / 2.02 / 0.5)
+
+
+def test_gyro_scale_stretches_what_is_left_without_the_bias():
+    odometer = Odometer(Robot(drive="differential", turn_source="gyro", gyro_bias_rad_s=0.1, gyro_scale=1.2))
+    state = odometer.start(0)
+    for k in range(11):
+        state, _ = odometer.advance(state, Gyro(k * SECOND // 10, "g", k, 0.6))
+    _, (motion,) = odometer.advance(state, Odometry(SECOND, "w", 0, 0, 0.2, 9.9))
+    assert motion.turn_rad == pytest.approx(0.6)
 
 
 def test_gyro_gives_the_turn_where_the_world_says_so():
@@ -414,6 +430,8 @@ def test_unusable_readings_are_named_one_by_one():
         ({"radio": {"path_los_exponent": 2.0}}, "did you mean 'path_loss_exponent'"),
         ({"robot": {"drive": "hover"}}, "none of"),
         ({"robot": {"track_width_m": 0.0}}, "greater than zero"),
+        ({"robot": {"diameter_ratio": -1.0}}, "greater than zero"),
+        ({"calibration": {"radio": {"metod": "by eye"}}}, "did you mean 'method'"),
         ({"anchors": []}, "add"),
     ],
 )

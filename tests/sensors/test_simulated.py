@@ -149,10 +149,10 @@ def test_robot_ends_on_its_last_way_point(name):
 
 
 @pytest.mark.parametrize("turn_source", ["wheels", "gyro"])
-@pytest.mark.parametrize("distance_scale", [1.0, 1.03])
-def test_odometry_of_a_perfect_robot_is_exact(turn_source, distance_scale):
+@pytest.mark.parametrize("told", [{}, {"distance_scale": 1.03}, {"diameter_ratio": 1.05}, {"gyro_scale": 1.1}])
+def test_odometry_of_a_perfect_robot_is_exact(turn_source, told):
     """What is left is the motion before the first message and the order of turning and driving inside one, 50 ms."""
-    scenario = ideal(ticks_per_revolution=FINE, turn_source=turn_source, distance_scale=distance_scale)
+    scenario = ideal(ticks_per_revolution=FINE, turn_source=turn_source, **told)
     assert dead_reckoned(with_reality(scenario, gyro_hz=100.0)).max() < 0.05
 
 

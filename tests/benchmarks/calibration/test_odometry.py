@@ -1,0 +1,210 @@
+"""Wheels of known scale and track are found again, within the intervals told; closed forms; poor input."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks.calibration.arcs import Roll, arc_end
+from benchmarks.calibration.odometry import (
+    fit_roll,
+    halves,
+    score_held_out,
+)
+from benchmarks.calibration.odometry_verb import calibrate_odometry
+from benchmarks.calibration.rolled import linear_trend, rolled
+from benchmarks.calibration.segments import SPIN, STRAIGHT, find_segments, read_segments
+from benchmarks.calibration.umbmark import umbmark
+from benchmarks.calibration.wheels import wheels
+from fusion import LogError, Odometry, Pose
+from fusion.odometry import Odometer
+from fusion.world import Robot
+from logs.run import TruthTrack
+
+TRACK = 0.3
+
+
+def unequal(run, ratio):
+    """The run as counted by wheels whose true rolls stand as ``ratio``, right over left, their mean kept."""
+    left, right = 2.0 / (1.0 + ratio), 2.0 * ratio / (1.0 + ratio)
+    told = tuple(
+        dataclasses.replace(m, counts=(round(m.counts[0] / left), round(m.counts[1] / right)))
+        if hasattr(m, "counts")
+        else m
+        for m in run.measurements
+    )
+    return dataclasses.replace(run, measurements=told)
+
+
+def test_a_robot_without_noise_is_found_exactly(drive):
+    run = drive(distance_scale_bias=0.04, track_scale_bias=0.1, slip_std=0.0, robot={"ticks_per_revolution": 20_000})
+    found = calibrate_odometry([run])
+    assert found.fit.roll.left == pytest.approx(1.0 / 1.04, rel=1e-4)
+    assert found.fit.roll.right == pytest.approx(1.0 / 1.04, rel=1e-4)
+    assert found.fit.roll.track_m == pytest.approx(1.1 * TRACK, rel=1e-3)
+    assert {score.what: score.after < 0.1 * score.before for score in found.scores} == {
+        "length of a piece": True,
+        "turn of a piece": True,
+    }
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say(drive):
+    """Wheels 1 % unequal, 3 % wrong, a track 8 % wrong, slip and ticks: 95 % intervals of all three numbers."""
+    held = []
+    for seed in range(25):
+        run = unequal(drive(seed, distance_scale_bias=0.03, track_scale_bias=0.08, slip_std=0.01), 1.01)
+        numbers = calibrate_odometry([run]).numbers
+        truth = {
+            "left scale": 2.0 / 2.01 / 1.03,
+            "right scale": 2.02 / 2.01 / 1.03,
+            "right over left, E_d": 1.01,
+            "effective track, m": 1.08 * TRACK,
+        }
+        held += [numbers[name].holds(value) for name, value in truth.items()]
+    # Four standard deviations below 95 %, if the hundred were independent.
+    assert np.mean(held) >= 0.87
+
+
+@settings(max_examples=10, deadline=None)
+@given(turned=st.floats(-3.0, 3.0), moved=st.floats(-50.0, 50.0))
+def test_turning_and_moving_the_floor_changes_nothing(drive, turned, moved):
+    run = drive(distance_scale_bias=0.03)
+    truth, (c, s) = run.truth, (math.cos(turned), math.sin(turned))
+    other = TruthTrack(
+        truth.time_ns, c * truth.x - s * truth.y + moved, s * truth.x + c * truth.y - moved, truth.heading + turned
+    )
+    one, two = (calibrate_odometry([each]).fit.roll for each in (run, dataclasses.replace(run, truth=other)))
+    assert two == pytest.approx(one, rel=1e-6)
+
+
+def test_what_is_fitted_is_what_estimators_get(drive):
+    """The same ticks through the host's own odometer, with the numbers in the world, end where the arcs do."""
+    run = unequal(drive(distance_scale_bias=0.03, track_scale_bias=0.08), 1.02)
+    roll = Roll(0.98, 1.01, 0.33)
+    robot = roll.told(run.world.robot)
+    assert Roll.of(robot) == pytest.approx(roll)
+    odometer, moved = Odometer(robot), [0.0, 0.0]
+    state = odometer.start(run.measurements[0].time_ns)
+    for measurement in run.measurements:
+        state, motion = odometer.advance(state, measurement)
+        for step in motion:
+            if isinstance(step, Odometry):
+                moved[0] += step.distance_m
+                moved[1] += step.turn_rad
+    told = wheels(run)
+    end = arc_end(roll, np.diff(told.left), np.diff(told.right))
+    ahead = 0.5 * (roll.left * told.left[-1] + roll.right * told.right[-1])
+    assert moved == pytest.approx([ahead, end.heading], abs=1e-9)
+
+
+def test_exact_arc_of_a_quarter_circle():
+    """Left 0, right pi/2 with track 1: a quarter turn about the left wheel, half a metre to its right."""
+    steps = np.full(7, math.pi / 2 / 7)
+    end = arc_end(Roll(1.0, 1.0, 1.0), np.zeros(7), steps)
+    assert end == pytest.approx(Pose(0.5, 0.5, math.pi / 2))
+
+
+def square(sense, roll, nominal, side=4.0, steps=50):
+    """End offset of a robot that believes it drives a square: true minus calculated, (1, 2)."""
+    left, right = [], []
+    for corner in range(4):
+        left += [side / steps] * steps
+        right += [side / steps] * steps
+        if corner < 3:
+            left += [-sense * math.pi / 4 * nominal / steps] * steps
+            right += [sense * math.pi / 4 * nominal / steps] * steps
+    ends = [arc_end(each, np.array(left), np.array(right)) for each in (roll, Roll(1.0, 1.0, nominal))]
+    return np.array([[ends[0].x - ends[1].x, ends[0].y - ends[1].y]])
+
+
+@pytest.mark.parametrize(("track", "ratio"), [(1.03, 1.0), (0.98, 1.0), (1.0, 1.001), (1.02, 1.001)])
+def test_closed_form_of_umbmark_finds_small_errors(track, ratio):
+    roll = Roll(2.0 / (1.0 + ratio), 2.0 * ratio / (1.0 + ratio), track * 0.5)
+    found = umbmark(square(-1, roll, 0.5), square(1, roll, 0.5), 4.0, 0.5)
+    assert found.track_ratio == pytest.approx(track, abs=0.003)
+    assert found.diameter_ratio == pytest.approx(ratio, abs=0.0003)
+
+
+def test_umbmark_of_a_perfect_robot_is_nothing():
+    roll = Roll(1.0, 1.0, 0.5)
+    found = umbmark(square(-1, roll, 0.5), square(1, roll, 0.5), 4.0, 0.5)
+    assert (found.e_max_m, found.track_ratio, found.diameter_ratio) == pytest.approx((0.0, 1.0, 1.0))
+
+
+def test_squares_are_found_and_judged_without_having_been_fitted(drive):
+    run = drive(laps=2, distance_scale_bias=0.03, track_scale_bias=0.08)
+    found = calibrate_odometry([run])
+    assert found.squares == 4
+    before, after = found.umbmark
+    assert before.e_max_m > 0.5
+    assert after.e_max_m < 0.2 * before.e_max_m
+
+
+def test_the_papers_line_is_the_scale_of_the_straight_moves(drive):
+    run = drive(distance_scale_bias=0.05)
+    told = wheels(run)
+    trend = linear_trend(rolled(find_segments(run, 0, told), [told], run.world.robot))
+    assert trend.scale.holds(1.0 / 1.05)
+    assert trend.offset_m.holds(0.0)
+
+
+def test_truth_without_headings_is_good_enough(drive):
+    run = drive(laps=2, distance_scale_bias=0.03, track_scale_bias=0.08)
+    blind = dataclasses.replace(run, truth=dataclasses.replace(run.truth, heading=np.full(len(run.truth), np.nan)))
+    found = calibrate_odometry([blind])
+    assert found.numbers["effective track, m"].holds(1.08 * TRACK)
+    assert found.numbers["effective track, m"].reach < 0.02 * TRACK
+    assert found.numbers["mean scale"].holds(1.0 / 1.03)
+
+
+def test_segments_are_measured_by_hand_too(drive, tmp_path):
+    """What the truth would say, typed into a file, gives the same calibration."""
+    run = drive(distance_scale_bias=0.03, track_scale_bias=0.08)
+    told, start = wheels(run), run.measurements[0].time_ns
+    rows = ["from_s,until_s,distance_m,turn_rad"]
+    for each in find_segments(run, 0, told):
+        texts = ["" if math.isnan(value) else repr(value) for value in (each.distance_m, each.turn_rad)]
+        rows.append(f"{(each.from_ns - start) / 1e9},{(each.until_ns - start) / 1e9},{','.join(texts)}")
+    path = tmp_path / "tape.csv"
+    path.write_text("\n".join(rows))
+    assert {each.kind for each in read_segments(path, run, 0)} == {STRAIGHT, SPIN}
+    blind = dataclasses.replace(run, truth=None)
+    assert calibrate_odometry([blind], path).fit.roll == pytest.approx(calibrate_odometry([run]).fit.roll, rel=1e-6)
+
+
+def test_nothing_is_scored_that_was_fitted(drive):
+    """Each half is judged by the other: a half that is spoiled makes both scores bad."""
+    run = drive(laps=2, slip_std=0.0)
+    told = wheels(run)
+    pieces = rolled(find_segments(run, 0, told), [told], run.world.robot)
+    first = {id(each) for each in halves(pieces)[0]}
+    spoiled = [
+        each._replace(segment=each.segment._replace(distance_m=1.1 * each.segment.distance_m))
+        if id(each) in first
+        else each
+        for each in pieces
+    ]
+    after = {score.what: score.after for score in score_held_out(spoiled, Roll(1.0, 1.0, TRACK), TRACK)}
+    # Both halves miss the other by a tenth of some two metres; in-sample nothing would be left.
+    assert after["length of a piece"] > 0.15
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"truth": None}, "holds no ground truth"),
+        ({"measurements": ()}, "no wheel ticks and no odometry"),
+    ],
+)
+def test_poor_runs_are_refused_with_the_remedy(drive, change, message):
+    with pytest.raises(LogError, match=message):
+        calibrate_odometry([dataclasses.replace(drive(), **change)])
+
+
+def test_lines_alone_are_too_few():
+    robot = Robot(drive="differential", track_width_m=TRACK)
+    with pytest.raises(LogError, match=r"three straight lines and four spins"):
+        fit_roll([], robot.track_width_m)
