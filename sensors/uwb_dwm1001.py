@@ -19,7 +19,7 @@ from sensors.uwb_serial import Heard, SerialRanging, sound_range
 
 BINARY_ANSWER = b"\x40\x01"
 PROMPT = b"dwm>"
-LISTEN_S, ANSWER_S = 0.5, 1.5
+LISTEN_S, ANSWER_S = 0.5, 3.0
 """How long to look for lines that flow, and for an answer: a module at rest reports every tenth of a second."""
 TRIES = 3
 ANCHOR, ID, DECIMAL = re.compile(r"AN\d"), re.compile(r"[0-9A-Fa-f]{4}"), re.compile(r"-?\d+\.\d+")

@@ -142,13 +142,17 @@ class Suite:
 
     @property
     def folder(self) -> Path:
-        """Where its paths begin."""
-        return self.path.parent
+        """Where its paths begin: beside its file, or here for a suite of the package, whose recordings are yours."""
+        return Path.cwd() if self._is_builtin else self.path.parent
 
     @property
     def word(self) -> str:
         """What names it on a command line, wherever that is typed on this machine."""
-        return self.path.stem if builtin_suites().get(self.path.stem) == self.path else str(self.path)
+        return self.path.stem if self._is_builtin else str(self.path)
+
+    @property
+    def _is_builtin(self) -> bool:
+        return builtin_suites().get(self.path.stem) == self.path
 
     def run(self, run_id: str) -> RunSource:
         """The run of that id."""
