@@ -9,13 +9,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.cell import status_of
-from benchmarks.faults.faults import apply_faults
+from benchmarks.faults.faults import apply_faults, outages
 from benchmarks.lane import Lane, run_lane
+from benchmarks.metrics.dynamics import fault_metrics
 from benchmarks.metrics.innovations import innovation_metrics
 from benchmarks.metrics.instants import evaluation_instants, match
 from benchmarks.metrics.interpolation import meet
-from benchmarks.metrics.score import errors, metrics
+from benchmarks.metrics.score import Errors, errors, metrics
 from benchmarks.metrics.track import Track, from_bytes, to_bytes
+from benchmarks.prior import begin_ns
 from benchmarks.runner.definition import CLEAN, CellLimits
 from benchmarks.runner.plan import Cell, read_faults
 from benchmarks.runner.source import open_run
@@ -108,16 +110,24 @@ def score(cell: Cell, store: Store) -> str:
 
 def _metrics(cell: Cell, track: Track) -> dict[str, float]:
     """Empty without truth."""
-    truth = open_run(cell.run, cell.folder).truth
-    if truth is None or len(truth) == 0:
+    run = open_run(cell.run, cell.folder)
+    if run.truth is None or len(run.truth) == 0:
         return {}
     rules = cell.evaluation
     if rules.reading == "interp":
-        met = meet(truth, track, gap_s=rules.gap_s)
-        scores = metrics(errors(met.instants, met.answers, met.weight))
-        return {**scores, "availability": met.availability}
-    instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
-    return metrics(errors(instants, match(instants, track, max_age_s=rules.max_age_s)))
+        met = meet(run.truth, track, gap_s=rules.gap_s)
+        measured = errors(met.instants, met.answers, met.weight)
+        return {**metrics(measured), **_of_faults(cell, run, measured), "availability": met.availability}
+    instants = evaluation_instants(run.truth, hz=rules.hz, gap_s=rules.gap_s)
+    measured = errors(instants, match(instants, track, max_age_s=rules.max_age_s))
+    return {**metrics(measured), **_of_faults(cell, run, measured)}
+
+
+def _of_faults(cell: Cell, run: Run, measured: Errors) -> dict[str, float]:
+    """How the cell did while its faults lasted, and after; empty without faults."""
+    if cell.fault.id == CLEAN:
+        return {}
+    return fault_metrics(measured, begin_ns(run.measurements), outages(read_faults(cell.fault)))
 
 
 def _finite(value: float) -> float | str | None:
