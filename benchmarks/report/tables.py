@@ -19,7 +19,7 @@ from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.results import ALIVE, Result, by_contestant, median_metrics, score_matrix
 from benchmarks.sheet import Sheet
 from benchmarks.statistics.statistics import mean_interval
-from benchmarks.table import COLUMNS, as_text
+from benchmarks.table import COLUMNS, Column, as_text
 
 
 def leaderboard(material: Material) -> Sheet:
@@ -54,19 +54,45 @@ def _interval_cm(scores: Floats) -> str:
 
 def faults(material: Material) -> Sheet:
     """How much worse each fault makes each contestant: the median over runs of faulty over clean."""
-    clean = by_contestant(material.results)
     rows = []
     for name in material.contestants:
-        base = np.median(score_matrix(clean[name], material.metric), axis=1)
         cells = []
         for fault in material.suite.faults[1:]:
             own = by_contestant(material.results, fault.id)[name]
-            ratio = quantile(np.median(score_matrix(own, material.metric), axis=1) / base, 0.5)
             lost = sum(result.status not in ALIVE for result in own)
-            cells.append(_times(ratio) + (f" ({lost} lost)" if lost else ""))
+            cells.append(_over_clean(material, name, own) + (f" ({lost} lost)" if lost else ""))
         rows.append((name, *cells))
     head = ("estimator", *(fault.id for fault in material.suite.faults if fault.id != CLEAN))
     return Sheet(f"Faults: {material.metric} as a multiple of the clean run's, median over runs", head, tuple(rows))
+
+
+def outages(material: Material) -> Sheet:
+    """What each fault with windows did while it lasted, and how soon after that was over; no rows without such."""
+    rows = []
+    for fault in material.suite.faults[1:]:
+        grouped = by_contestant(material.results, fault.id)
+        for name in material.contestants:
+            medians = median_metrics(grouped[name])
+            numbers = [as_text(column, medians) for column in OUTAGE_COLUMNS]
+            if set(numbers) != {"–"}:
+                rows.append((fault.id, name, *numbers, _over_clean(material, name, grouped[name])))
+    head = ("fault", "estimator", *(column.title for column in OUTAGE_COLUMNS), f"{material.metric} over clean")
+    return Sheet("While a fault lasts: medians over cells, the worst of its windows", head, tuple(rows))
+
+
+OUTAGE_COLUMNS = (
+    Column("fault_availability", "available inside, %", 100.0, 1),
+    Column("fault_max_in_outage", "greatest error inside, cm", 100.0, 1),
+    Column("fault_growth", "growth inside, cm/s", 100.0, 2),
+    Column("fault_t_recover", "below 1 m again after, s", 1.0, 1),
+)
+
+
+def _over_clean(material: Material, name: str, faulty: Sequence[Result]) -> str:
+    """The ranking metric of a contestant's ``faulty`` cells over that of its clean ones, median over runs."""
+    clean = by_contestant(material.results)[name]
+    ratios = (np.median(score_matrix(own, material.metric), axis=1) for own in (faulty, clean))
+    return _times(quantile(np.divide(*ratios), 0.5))
 
 
 def _times(ratio: float) -> str:
