@@ -53,6 +53,12 @@ class Fault(ABC):
         """Where it strikes, but not how hard: the name of its random numbers."""
         return "/".join([self.kind, *(value for value in self.options().values() if isinstance(value, str))])
 
+    @property
+    def lasts(self) -> Windows:
+        """When it strikes; empty for one that lasts the whole run, or never strikes."""
+        windows: Windows | None = getattr(self, "windows", None)
+        return windows or ()
+
 
 def _are_windows(windows: Windows) -> bool:
     return all(0.0 <= begin < end for begin, end in windows)

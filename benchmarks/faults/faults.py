@@ -18,6 +18,7 @@ from benchmarks.faults.fault_kind import Fault
 from benchmarks.faults.message_faults import Clock, Delay, Drop, GyroDrop
 from benchmarks.faults.motion_faults import BadStart, Freeze, GyroBias, Kidnap, Slip
 from benchmarks.faults.radio_faults import Nlos, Outlier, PowerStep, RssiNoise
+from benchmarks.faults.rows import Windows
 from benchmarks.faults.tape import Tape
 from fusion import ParameterError, WorldError
 from fusion.errors import did_you_mean
@@ -78,6 +79,17 @@ def apply_faults(run: Run, faults: Sequence[Fault], *, suite_seed: int, fault_id
         except ParameterError as error:
             raise ParameterError(f"fault {fault_id!r} ({fault.kind}) on run {run.name!r}: {error}") from error
     return tape.told()
+
+
+def outages(faults: Sequence[Fault]) -> Windows:
+    """When any of ``faults`` that do not last the whole run strikes, in order; those that overlap or touch are one."""
+    merged: list[tuple[float, float]] = []
+    for begin, end in sorted(window for fault in faults for window in fault.lasts):
+        if merged and begin <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(end, merged[-1][1]))
+        else:
+            merged.append((begin, end))
+    return tuple(merged)
 
 
 def fault_seed(suite_seed: int, run: str, fault: str, seed: int) -> np.random.SeedSequence:

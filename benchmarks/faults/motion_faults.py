@@ -95,10 +95,15 @@ class Kidnap(Fault):
 
     def strike(self, tape: Tape, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
         """Stop the wheels and the gyro, and silence the radio."""
-        carried = tape.messages.within(((self.from_s, self.until_s),))
+        carried = tape.messages.within(self.lasts)
         tape.roll[carried] = 0.0
         tape.rate_rad_s[carried] = tape.run.world.robot.gyro_bias_rad_s
         tape.messages.kept[carried & np.isin(tape.messages.topic, ("wifi", "ranges"))] = False
+
+    @property
+    def lasts(self) -> Windows:
+        """From the first to the last moment of it."""
+        return ((self.from_s, self.until_s),)
 
 
 @dataclass(frozen=True, slots=True)

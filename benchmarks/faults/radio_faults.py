@@ -45,6 +45,11 @@ class PowerStep(Fault):
         """Shift the readings after the step."""
         tape.value[tape.readings.select("wifi", self.source, ((self.from_s, np.inf),))] += self.step_db
 
+    @property
+    def lasts(self) -> Windows:
+        """For ever from the step on, if that is not the whole run."""
+        return ((self.from_s, np.inf),) if self.from_s > 0.0 else ()
+
 
 @dataclass(frozen=True, slots=True)
 class Nlos(Fault):

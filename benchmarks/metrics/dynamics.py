@@ -6,13 +6,14 @@ A stretch of instants lasts from its first to its last one.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.metrics.deviation import Errors
 from benchmarks.metrics.drift import theil_sen
-from benchmarks.metrics.quantiles import quantile
+from benchmarks.metrics.quantiles import mean, quantile
 from benchmarks.metrics.track import Flags, Whole
 from fusion.values import NANOSECONDS, nanoseconds
 
@@ -51,7 +52,7 @@ def stretches(mask: Flags, run: Whole) -> Stretches:
 
 
 def dynamic_metrics(measured: Errors) -> dict[str, float]:
-    """All of this module; NaN without instants."""
+    """All of this module that needs no windows; NaN without instants."""
     return {**convergence_metrics(measured), **failure_metrics(measured), **silence_metrics(measured)}
 
 
@@ -89,29 +90,67 @@ def kaplan_meier_median(times: list[float], reached: list[bool]) -> float:
     return math.inf
 
 
-def failure_metrics(measured: Errors, outages: Stretches | None = None) -> dict[str, float]:
-    """Failures, and the worst of ``outages`` (None: of the failures themselves): ``t_recover`` [s] from its end until
-    converged again, infinite if never; ``max_in_outage`` [m], the greatest error of a valid answer inside it;
-    ``growth`` [m/s], the Theil-Sen slope of the error inside it. NaN where there was none.
+def failure_metrics(measured: Errors) -> dict[str, float]:
+    """``failures``, and the worst of all of them: ``t_recover`` [s] from the end of one until converged again, infinite
+    if never; ``max_in_outage`` [m], the greatest error of a valid answer inside it; ``growth`` [m/s], the Theil-Sen
+    slope of the error inside it. NaN where there was none.
     """
     failed = stretches(measured.position > FAILED_M, measured.run).lasting(measured.time_ns, FAILED_S)
-    events = failed if outages is None else outages
-    known = [_outage(measured, first, last) for first, last in zip(*map(np.ndarray.tolist, events), strict=True)]
-    worst = [max((x for x in column if not math.isnan(x)), default=math.nan) for column in zip(*known, strict=True)]
-    names = ("t_recover", "max_in_outage", "growth")
-    return {"failures": float(len(failed.first)), **dict(zip(names, worst or [math.nan] * 3, strict=True))}
+    ends_ns = measured.time_ns[failed.last]
+    spans = zip(failed.first.tolist(), (failed.last + 1).tolist(), ends_ns.tolist(), strict=True)
+    return {"failures": float(len(failed.first)), **_worst([_outage(measured, *span) for span in spans])}
 
 
-def _outage(measured: Errors, first: int, last: int) -> tuple[float, float, float]:
-    inside = measured.position[first : last + 1]
+def fault_metrics(measured: Errors, start_ns: int, windows: Sequence[tuple[float, float]]) -> dict[str, float]:
+    """What a fault did in its ``windows`` [begin, end), seconds from ``start_ns``, of a single run.
+
+    ``fault_availability`` is the share of the instants inside with a valid answer; NaN where instants have weights, for
+    there nothing says what was left out. ``fault_t_recover``, ``fault_max_in_outage`` and ``fault_growth`` are the
+    worst over windows of what `failure_metrics` says of failures; a window that the run does not outlast has no
+    recovery. All NaN without an instant inside.
+    """
+    elapsed_s = (measured.time_ns - start_ns) / NANOSECONDS
+    outages, asked = [], [np.empty(0)]
+    for begin_s, end_s in windows:
+        first, beyond = np.searchsorted(elapsed_s, (begin_s, end_s)).tolist()
+        if first < beyond:
+            end_ns = start_ns + nanoseconds(end_s) if beyond < len(elapsed_s) else None
+            outages.append(_outage(measured, first, beyond, end_ns))
+            asked.append(measured.position[first:beyond])
+    available = mean(np.isfinite(np.concatenate(asked))) if measured.weight is None else math.nan
+    return {"fault_availability": available, **{f"fault_{name}": value for name, value in _worst(outages).items()}}
+
+
+class Outage(NamedTuple):
+    """What one failure or fault did; NaN is what cannot be said."""
+
+    t_recover: float
+    max_in_outage: float
+    growth: float
+
+
+def _worst(outages: Sequence[Outage]) -> dict[str, float]:
+    """The greatest of each, by name."""
+    known = np.array([Outage(math.nan, math.nan, math.nan), *outages])
+    return dict(zip(Outage._fields, np.fmax.reduce(known).tolist(), strict=True))
+
+
+def _outage(measured: Errors, first: int, beyond: int, end_ns: int | None) -> Outage:
+    """Of the instants from ``first`` up to ``beyond``; ``end_ns`` is when it ended, None if not before the run did."""
+    inside = measured.position[first:beyond]
     valid = np.isfinite(inside)
-    seconds = (measured.time_ns[first : last + 1][valid] - measured.time_ns[first]) / NANOSECONDS
+    seconds = (measured.time_ns[first:beyond][valid] - measured.time_ns[first]) / NANOSECONDS
     peak = float(inside[valid].max()) if valid.any() else math.nan
-    rest = slice(last + 1, last + 1 + int(np.count_nonzero(measured.run[last + 1 :] == measured.run[last])))
+    recovered = math.nan if end_ns is None else _recovery_s(measured, beyond, end_ns)
+    return Outage(recovered, peak, theil_sen(seconds, inside[valid]))
+
+
+def _recovery_s(measured: Errors, beyond: int, end_ns: int) -> float:
+    """From ``end_ns`` until converged, sought from the instant ``beyond`` to the end of its run; infinite if never."""
+    rest = slice(beyond, beyond + int(np.count_nonzero(measured.run[beyond:] == measured.run[beyond - 1])))
     rest_ns = measured.time_ns[rest]
     held = stretches(measured.position[rest] <= CONVERGED_M, measured.run[rest]).lasting(rest_ns, CONVERGED_S)
-    recovered = (rest_ns[held.first[0]] - measured.time_ns[last]) / NANOSECONDS if len(held.first) else math.inf
-    return float(recovered), peak, theil_sen(seconds, inside[valid])
+    return float(rest_ns[held.first[0]] - end_ns) / NANOSECONDS if len(held.first) else math.inf
 
 
 def silence_metrics(measured: Errors) -> dict[str, float]:

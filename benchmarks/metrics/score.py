@@ -18,7 +18,7 @@ from benchmarks.metrics.position import axis_metrics, heading_metrics, position_
 from benchmarks.metrics.quantiles import quantile
 from benchmarks.metrics.trajectory import trajectory_metrics
 
-METRICS_VERSION = 6
+METRICS_VERSION = 7
 """Changes whenever a metric does, so that stored scores are not taken for current ones."""
 
 __all__ = [

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from benchmarks.metrics.deviation import Errors
 from benchmarks.metrics.quantiles import mean, quantile, quantiles, root_mean_squares
-from benchmarks.metrics.track import Floats, Whole
+from benchmarks.metrics.track import Flags, Floats, Whole
 from fusion.values import NANOSECONDS, nanoseconds
 
 DISTANCES_M = (1, 5, 10)
@@ -33,23 +33,23 @@ Pairs = tuple[slice | Whole, slice | Whole]
 
 def trajectory_metrics(measured: Errors, *, top_speed_m_s: float = TOP_SPEED_M_S) -> dict[str, float]:
     """All of this module."""
+    poses = Poses.of(measured)
     return {
-        **relative_pose_metrics(measured),
-        **velocity_metrics(measured),
-        **step_metrics(measured, top_speed_m_s),
+        **relative_pose_metrics(poses),
+        **velocity_metrics(poses),
+        **step_metrics(poses, measured.age_s, top_speed_m_s),
     }
 
 
-def relative_pose_metrics(measured: Errors) -> dict[str, float]:
+def relative_pose_metrics(poses: Poses) -> dict[str, float]:
     """``rpe_d_1m_rmse`` ... ``rpe_t_10s_rot_median``: RMSE and median of translation [m] and ``rot``ation [rad].
 
     From every instant to the first one after at least 1, 5, 10 m of *true* path, or 1, 5, 10 s; ``n`` pairs with a
     whole pose at both ends (Sturm et al. 2012; Geiger et al. 2012; Zhang & Scaramuzza 2018).
     """
-    poses, path_m, clock_ns = Poses.of(measured), _path_m(measured), _clock_ns(measured)
-    period_ns = _period_ns(clock_ns)
-    pairs = {f"rpe_d_{reach}m": ahead(path_m, reach - ROUNDING_M) for reach in DISTANCES_M}
-    pairs |= {f"rpe_t_{reach}s": later(clock_ns, nanoseconds(reach), period_ns) for reach in DURATIONS_S}
+    pairs = {f"rpe_d_{reach}m": ahead(poses.path_m, reach - ROUNDING_M) for reach in DISTANCES_M}
+    period_ns = poses.period_ns
+    pairs |= {f"rpe_t_{reach}s": later(poses.clock_ns, nanoseconds(reach), period_ns) for reach in DURATIONS_S}
     whole = not np.isnan(poses.turn).any()
     scores: dict[str, float] = {}
     for name, (start, end) in pairs.items():
@@ -87,30 +87,42 @@ def later(clock_ns: Whole, reach_ns: int, period_ns: int) -> Pairs:
     return slice(max(len(clock_ns) - count, 0)), slice(count, None)
 
 
-def _period_ns(clock_ns: Whole) -> int:
-    """From each instant to the next, as most come; 0 where they are not even."""
-    steps = clock_ns[1:] - clock_ns[:-1]
-    return int(steps[0]) if len(steps) and steps.min() == steps.max() else 0
-
-
 class Poses(NamedTuple):
-    """What relative errors are computed from, (n,): points [m] as complex numbers, the answers' heading error [rad],
-    the rotation that takes it back, and the answer's point so rotated minus the true one.
+    """What every metric of this module is computed from, (n,), the runs one after the other.
+
+    Points [m] are complex numbers, ``error`` the answer minus the truth; ``turn`` is the answer's heading error [rad],
+    ``back`` the rotation that takes it back, ``beside`` the answer's point so rotated minus the true one; all NaN where
+    there is no answer. ``path_m`` and ``clock_ns``: true path and time since the first instant. ``joined`` (n - 1,):
+    whether an instant and the next one belong to one run.
     """
 
     true: Points
+    error: Points
     said: Points
     turn: Floats
     back: Points
     beside: Points
+    path_m: Floats
+    clock_ns: Whole
+    joined: Flags
 
     @classmethod
     def of(cls, measured: Errors) -> Poses:
-        """Those of all instants; NaN where there is no answer."""
-        true = measured.x + 1j * measured.y
-        said = true + (measured.dx + 1j * measured.dy)
+        """Those of all instants."""
+        true, error = measured.x + 1j * measured.y, measured.dx + 1j * measured.dy
+        said = true + error
         back = np.cos(measured.turn) - 1j * np.sin(measured.turn)
-        return cls(true, said, measured.turn, back, said * back - true)
+        joined = measured.run[1:] == measured.run[:-1]
+        path_m, clock_ns = np.zeros(len(true)), np.zeros_like(measured.time_ns)
+        np.cumsum(np.where(joined, np.abs(true[1:] - true[:-1]), APART), out=path_m[1:])
+        np.cumsum(np.where(joined, measured.time_ns[1:] - measured.time_ns[:-1], nanoseconds(APART)), out=clock_ns[1:])
+        return cls(true, error, said, measured.turn, back, said * back - true, path_m, clock_ns, joined)
+
+    @property
+    def period_ns(self) -> int:
+        """From each instant to the next; 0 where they are not even."""
+        steps = self.clock_ns[1:] - self.clock_ns[:-1]
+        return int(steps[0]) if len(steps) and steps.min() == steps.max() else 0
 
 
 def relative_errors(poses: Poses, start: slice | Whole, end: slice | Whole) -> Floats:
@@ -127,53 +139,30 @@ def relative_errors(poses: Poses, start: slice | Whole, end: slice | Whole) -> F
     return np.array([np.abs(moved), np.minimum(turned, 2.0 * np.pi - turned)])
 
 
-def velocity_metrics(measured: Errors) -> dict[str, float]:
+def velocity_metrics(poses: Poses) -> dict[str, float]:
     """Size of the difference between the mean velocities over 1 s of answers and truth [m/s]: mean and p95."""
-    clock_ns = _clock_ns(measured)
-    start, end = later(clock_ns, nanoseconds(SPEED_WINDOW_S), _period_ns(clock_ns))
-    error = measured.dx + 1j * measured.dy
-    gained = np.abs(error[end] - error[start])
-    speed = gained / ((clock_ns[end] - clock_ns[start]) / NANOSECONDS)
+    start, end = later(poses.clock_ns, nanoseconds(SPEED_WINDOW_S), poses.period_ns)
+    gained = np.abs(poses.error[end] - poses.error[start])
+    speed = gained / ((poses.clock_ns[end] - poses.clock_ns[start]) / NANOSECONDS)
     known = speed[~np.isnan(speed)]
     return {"vel_err": mean(known), "vel_err_p95": quantile(known, 0.95)}
 
 
-def step_metrics(measured: Errors, top_speed_m_s: float = TOP_SPEED_M_S) -> dict[str, float]:
+def step_metrics(poses: Poses, age_s: Floats, top_speed_m_s: float = TOP_SPEED_M_S) -> dict[str, float]:
     """From one answered instant to the next: jumps per minute, and the answers' path over the true one.
 
-    A jump is a step longer than ``top_speed_m_s`` allows in the time between the stamps of both answers, plus 0.10 m.
+    A jump is a step longer than ``top_speed_m_s`` allows in the time between the stamps of both answers, which are
+    ``age_s`` (n,) old, plus 0.10 m.
     """
-    if len(measured.time_ns) == 0:
-        return {"jump_rate": math.nan, "path_ratio": math.nan}
-    true, error = measured.x + 1j * measured.y, measured.dx + 1j * measured.dy
-    moved = true[1:] - true[:-1]
-    step = np.abs(moved + (error[1:] - error[:-1]))
-    seconds = (measured.time_ns[1:] - measured.time_ns[:-1]) / NANOSECONDS
-    age_s = np.where(np.isfinite(measured.age_s), measured.age_s, 0.0)
-    stamped = seconds - (age_s[1:] - age_s[:-1])
-    both = np.isfinite(step) & (measured.run[1:] == measured.run[:-1])
+    moved = poses.true[1:] - poses.true[:-1]
+    step = np.abs(moved + (poses.error[1:] - poses.error[:-1]))
+    seconds = (poses.clock_ns[1:] - poses.clock_ns[:-1]) / NANOSECONDS
+    known_s = np.where(np.isfinite(age_s), age_s, 0.0)
+    stamped = seconds - (known_s[1:] - known_s[:-1])
+    both = np.isfinite(step) & poses.joined
     jumps = step[both] > top_speed_m_s * stamped[both] + JUMP_M
     minutes, length = float(seconds[both].sum()) / 60.0, float(np.abs(moved)[both].sum())
     return {
         "jump_rate": float(np.count_nonzero(jumps)) / minutes if minutes else math.nan,
         "path_ratio": float(step[both].sum()) / length if length else math.nan,
     }
-
-
-def _path_m(measured: Errors) -> Floats:
-    """True path length up to each instant (n,) [m]."""
-    place = measured.x + 1j * measured.y
-    steps = np.abs(place[1:] - place[:-1])
-    steps[measured.run[1:] != measured.run[:-1]] = APART
-    path_m = np.zeros(len(place))
-    np.cumsum(steps, out=path_m[1:])
-    return path_m
-
-
-def _clock_ns(measured: Errors) -> Whole:
-    """Time since the first instant (n,), the runs one after the other."""
-    steps = measured.time_ns[1:] - measured.time_ns[:-1]
-    steps[measured.run[1:] != measured.run[:-1]] = nanoseconds(APART)
-    clock_ns = np.zeros_like(measured.time_ns)
-    np.cumsum(steps, out=clock_ns[1:])
-    return clock_ns

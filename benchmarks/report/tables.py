@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,7 +20,14 @@ from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.results import ALIVE, Result, by_contestant, by_run, median_metrics, score_matrix
 from benchmarks.sheet import Sheet
 from benchmarks.statistics.statistics import mean_interval
-from benchmarks.table import COLUMNS, Unit, as_text
+from benchmarks.table import COLUMNS, Column, Unit, as_text
+
+OUTAGE_COLUMNS = (
+    Column("fault_availability", "available inside, %", 100.0, 1),
+    Column("fault_max_in_outage", "greatest error inside, cm", 100.0, 1),
+    Column("fault_growth", "growth inside, cm/s", 100.0, 2),
+    Column("fault_t_recover", "below 1 m again after, s", 1.0, 1),
+)
 
 
 def leaderboard(material: Material) -> Sheet:
@@ -60,25 +68,38 @@ def _interval(scores: Floats, unit: Unit) -> str:
 
 def faults(material: Material) -> Sheet:
     """How much worse each fault makes each contestant: the median over runs of faulty over clean."""
-    clean = by_contestant(material.results)
-    rows = []
-    for name in material.contestants:
-        base = np.median(score_matrix(clean[name], material.metric), axis=1)
-        rows.append((name, *(_under(material, name, base, fault.id) for fault in material.suite.faults[1:])))
+    clean, struck = by_contestant(material.results), material.suite.faults[1:]
+    rows = [
+        (name, *(_under(material, name, clean[name], fault.id) for fault in struck)) for name in material.contestants
+    ]
     head = ("estimator", *(fault.id for fault in material.suite.faults if fault.id != CLEAN))
     return Sheet(f"Faults: {material.metric} as a multiple of the clean run's, median over runs", head, tuple(rows))
 
 
-def _under(material: Material, name: str, base: Floats, fault: str) -> str:
-    """One contestant under one fault; leads to the run that stands in the middle."""
+def _under(material: Material, name: str, clean: Sequence[Result], fault: str) -> str:
+    """One contestant under one fault, over its ``clean`` cells; leads to the run that stands in the middle."""
     own = by_contestant(material.results, fault)[name]
-    scores = np.median(score_matrix(own, material.metric), axis=1)
+    base, scores = (np.median(score_matrix(cells, material.metric), axis=1) for cells in (clean, own))
     ratios = np.where(np.isfinite(base), scores / base, np.inf)
     ratio = quantile(ratios, 0.5)
     lost = sum(result.status not in ALIVE for result in own)
     row = nearest_to(ratios.tolist(), ratio)
     text = _times(ratio) + (f" ({lost} lost)" if lost else "")
     return link(material, text, nearest(list(by_run(own).values())[row], material.metric, scores[row]))
+
+
+def outages(material: Material) -> Sheet:
+    """What each fault with windows did while it lasted, and how soon after that was over; no rows without such."""
+    rows, clean = [], by_contestant(material.results)
+    for fault in material.suite.faults[1:]:
+        grouped = by_contestant(material.results, fault.id)
+        for name in material.contestants:
+            medians = median_metrics(grouped[name])
+            numbers = [as_text(column, medians) for column in OUTAGE_COLUMNS]
+            if set(numbers) != {"–"}:
+                rows.append((fault.id, name, *numbers, _under(material, name, clean[name], fault.id)))
+    head = ("fault", "estimator", *(column.title for column in OUTAGE_COLUMNS), f"{material.metric} over clean")
+    return Sheet("While a fault lasts: medians over cells, the worst of its windows", head, tuple(rows))
 
 
 def _times(ratio: float) -> str:

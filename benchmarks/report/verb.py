@@ -127,6 +127,8 @@ def _sheets(material: Material, *, limit: bool) -> Iterator[Sheet]:
         yield tables.fixes(material)
     if len(material.suite.faults) > 1:
         yield tables.faults(material)
+        if (outages := tables.outages(material)).rows:
+            yield outages
         if material.suite.seeds >= LEAST_SEEDS and material.scored_runs:
             yield tables.credibility(material)
     for found in (tables.moments(material), tables.lost(material)):

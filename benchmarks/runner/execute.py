@@ -8,24 +8,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from benchmarks.cell import status_of
 from benchmarks.faults.faults import apply_faults
 from benchmarks.lane import Lane, run_lane
 from benchmarks.metrics.archive import from_bytes, to_bytes
 from benchmarks.metrics.innovations import innovation_metrics
-from benchmarks.metrics.instants import evaluation_instants, match
-from benchmarks.metrics.interpolation import meet
-from benchmarks.metrics.score import Errors, errors, metrics
-from benchmarks.metrics.track import Track
 from benchmarks.review.frame import Frame
 from benchmarks.runner.definition import CLEAN, CellLimits
+from benchmarks.runner.judge import judge
 from benchmarks.runner.plan import Cell, read_faults
 from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store, to_json
 from benchmarks.workers import Limits, Loss, compute
-from fusion.values import seconds
 from logs.run import Run
 
 LOST = {
@@ -108,53 +102,19 @@ def score(cell: Cell, store: Store) -> str:
     if not store.has("scores", cell.score_key):
         made = store.read_json("estimates", cell.estimate_key, "result.json")
         track, fates = from_bytes(store.read("estimates", cell.estimate_key, "track.npz"))
-        judged = _errors(cell, track)
-        measured = _metrics(judged)
+        judged = judge(cell, track)
+        measured = {} if judged is None else judged.metrics
         said = (measured.get("availability", math.nan), measured.get("pos_p50", math.nan))
         status = made["ended"] if made["error"] else status_of(track, *said)
         measured |= innovation_metrics(fates)
         numbers = {key: _finite(value) for key, value in measured.items()}
-        found = {"status": status, "metrics": numbers, "worst_at_s": _worst_at_s(judged, made.get("start_ns"))}
+        found = {
+            "status": status,
+            "metrics": numbers,
+            "worst_at_s": None if judged is None else judged.worst_at_s(made.get("start_ns")),
+        }
         store.write("scores", cell.score_key, {"result.json": to_json(found)})
     return str(store.read_json("scores", cell.score_key, "result.json")["status"])
-
-
-class _Judged(NamedTuple):
-    """Errors, and of how much of the run there was an answer where they do not say it themselves."""
-
-    errors: Errors
-    availability: float | None
-
-
-def _errors(cell: Cell, track: Track) -> _Judged | None:
-    """None without truth."""
-    truth = open_run(cell.run, cell.folder).truth
-    if truth is None or len(truth) == 0:
-        return None
-    rules = cell.evaluation
-    if rules.reading == "interp":
-        met = meet(truth, track, gap_s=rules.gap_s)
-        return _Judged(errors(met.instants, met.answers, met.weight), met.availability)
-    instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
-    return _Judged(errors(instants, match(instants, track, max_age_s=rules.max_age_s)), None)
-
-
-def _metrics(judged: _Judged | None) -> dict[str, float]:
-    if judged is None:
-        return {}
-    scores = metrics(judged.errors)
-    return scores if judged.availability is None else {**scores, "availability": judged.availability}
-
-
-def _worst_at_s(judged: _Judged | None, start_ns: int | None) -> float | None:
-    """When the position error was greatest, since the start of the run; None where there was no answer at all."""
-    if judged is None or start_ns is None:
-        return None
-    error_m = np.where(np.isfinite(judged.errors.position), judged.errors.position, -1.0)
-    worst = int(error_m.argmax()) if len(error_m) else 0
-    if len(error_m) == 0 or error_m[worst] < 0.0:
-        return None
-    return seconds(int(judged.errors.time_ns[worst]) - start_ns)
 
 
 def _finite(value: float) -> float | str | None:

@@ -17,13 +17,13 @@ from benchmarks.report.cells import SCRIPT
 from benchmarks.report.figures import FIGURES
 from benchmarks.report.material import Material
 from benchmarks.report.sensitivity import WITHOUT_TUNE
-from benchmarks.report.tables import credibility, fixes
+from benchmarks.report.tables import credibility, faults, fixes, outages
 from benchmarks.report.verb import report
 from benchmarks.report.worst import command, worst_moments
 from benchmarks.review.review import review
 from benchmarks.runner.definition import load_suite
 from benchmarks.runner.plan import cells_of
-from benchmarks.runner.results import read_results
+from benchmarks.runner.results import by_contestant, read_results
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
 from fusion.cli import main
@@ -123,6 +123,22 @@ def test_credibility_is_told_where_seeds_can_tell_it(material, tmp_path):
     assert rows["wheels"] == ("–",)
     nci, incl = map(float, re.fullmatch(r"([\d.]+) \(([+-][\d.]+)\)", rows["radio"][0]).groups())
     assert 0.0 < abs(incl) <= nci
+
+
+def test_fault_with_windows_is_told_by_what_happened_inside(material, tmp_path):
+    assert "While a fault lasts" not in report(material)
+    text = SUITE.replace('topic = "wifi" }', 'topic = "wifi", windows = [[5.0, 12.0]] }')
+    (tmp_path / "windows.toml").write_text(text, encoding="utf-8")
+    suite, store = load_suite(tmp_path / "windows.toml"), Store(tmp_path / "store")
+    results = run_suite(suite, store, workers=1)
+    struck = Material(suite, results, store)
+    assert "While a fault lasts" in report(struck)
+    rows = {row[:2]: row[2:] for row in outages(struck).rows}
+    assert rows["silence", "wheels"][0] == "100.0"
+    inside = [one.metrics for one in by_contestant(results, "silence")["radio"]]
+    for place, key in enumerate(("fault_availability", "fault_max_in_outage")):
+        assert rows["silence", "radio"][place] == f"{100.0 * np.median([one[key] for one in inside]):.1f}"
+    assert [row[-1] for row in rows.values()] == [row[1] for row in faults(struck).rows]
 
 
 def test_what_one_run_says_of_itself_is_told_only_where_it_is_the_only_one(material, tmp_path):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.faults.faults import KINDS, apply_faults, fault_seed, read_fault, stable_hash
+from benchmarks.faults.faults import KINDS, apply_faults, fault_seed, outages, read_fault, stable_hash
 from benchmarks.faults.message_faults import Clock, Delay, Drop, GyroDrop
 from benchmarks.faults.motion_faults import WHEELS, BadStart, Freeze, GyroBias, Kidnap, Slip
 from benchmarks.faults.radio_faults import Nlos, Outlier, PowerStep, RssiNoise
@@ -278,6 +278,30 @@ def test_messages_outside_the_windows_are_never_touched(kind):
     kept = [m for m in RUN.measurements if not is_in(m) and not isinstance(m, WheelTicks)]
     assert [m for m in faulty.measurements if not is_in(m) and not isinstance(m, WheelTicks)] == kept
     assert faulty != RUN
+    assert fault.lasts == WINDOWS
+
+
+@pytest.mark.parametrize(
+    ("fault", "lasts"),
+    [
+        (Kidnap(5.0, 9.0), ((5.0, 9.0),)),
+        (PowerStep("ap1", -6.0, 10.0), ((10.0, math.inf),)),
+        (PowerStep("ap1", -6.0), ()),
+        (Drop("wifi"), ()),
+        (Drop("wifi", windows=()), ()),
+        (BadStart(1.0, 30.0), ()),
+        (Clock("gyro", offset_s=1.0), ()),
+    ],
+)
+def test_fault_tells_when_it_lasts_unless_that_is_always(fault, lasts):
+    assert fault.lasts == lasts
+
+
+def test_faults_together_last_as_long_as_any_of_them():
+    apart = Drop("wifi", windows=((40.0, 50.0), (1.0, 2.0)))
+    together = (apart, RssiNoise(3.0), Kidnap(45.0, 48.0), GyroDrop(((50.0, 55.0),)), Freeze(windows=((2.5, 3.0),)))
+    assert outages(together) == ((1.0, 2.0), (2.5, 3.0), (40.0, 55.0))
+    assert outages((RssiNoise(3.0),)) == ()
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ import pytest
 from benchmarks.metrics.deviation import errors, pool
 from benchmarks.metrics.drift import MOST_PAIRS, drift_metrics, pairs_of, theil_sen
 from benchmarks.metrics.dynamics import (
-    Stretches,
     convergence_metrics,
     failure_metrics,
+    fault_metrics,
     kaplan_meier_median,
     silence_metrics,
     stretches,
@@ -98,13 +98,68 @@ def test_recovery_is_sought_in_the_same_run_only(off_by):
     assert failure_metrics(pool([good, fails, good]))["t_recover"] == math.inf
 
 
-def test_outages_may_be_given_instead_of_failures(off_by):
+FAULT_IDS = ("fault_availability", "fault_t_recover", "fault_max_in_outage", "fault_growth")
+
+
+def test_fault_is_told_by_its_window_whatever_the_error_outside(off_by):
+    """From 5 s to 10 s after the start, which is 1 s before the first instant: instants 40 to 89."""
+    position = np.full(300, 0.2)
+    position[10:20] = 50.0
+    position[40:90] = 0.5 + 0.02 * np.arange(50)
+    position[60:70] = math.inf
+    position[90:125] = 1.2
+    scores = fault_metrics(off_by(position), -1_000_000_000, ((5.0, 10.0),))
+    assert tuple(scores) == FAULT_IDS
+    assert scores["fault_availability"] == 0.8
+    assert scores["fault_t_recover"] == pytest.approx(3.5, rel=1e-12)
+    assert scores["fault_max_in_outage"] == pytest.approx(0.5 + 0.02 * 49, rel=1e-12)
+    assert scores["fault_growth"] == pytest.approx(0.2, rel=1e-9)
+
+
+def test_fault_that_hurts_nobody_is_recovered_from_at_once(off_by):
+    scores = fault_metrics(off_by(np.full(300, 0.2)), 0, ((5.0, 10.0),))
+    assert scores == pytest.approx(dict(zip(FAULT_IDS, (1.0, 0.0, 0.2, 0.0), strict=True)))
+
+
+def test_recovery_counts_from_the_end_of_the_window_and_not_from_an_instant(off_by):
+    scores = fault_metrics(off_by(np.full(30, 0.2), period_s=4.0), 0, ((5.0, 9.0),))
+    assert scores["fault_t_recover"] == 3.0
+
+
+def test_of_several_windows_the_worst_counts_and_the_availability_of_all(off_by):
+    position = np.full(400, 0.2)
+    position[50:100] = 0.9
+    position[200:250] = math.inf
+    position[250:260] = 2.0
+    scores = fault_metrics(off_by(position), 0, ((5.0, 10.0), (20.0, 25.0)))
+    assert scores["fault_availability"] == 0.5
+    assert scores["fault_max_in_outage"] == pytest.approx(0.9)
+    assert scores["fault_t_recover"] == pytest.approx(1.0)
+
+
+def test_recovery_that_the_run_does_not_see_is_infinite_and_one_it_cannot_see_unknown(off_by):
     position = np.full(200, 0.2)
-    position[50:100] = 0.2 + 0.01 * np.arange(50)
-    scores = failure_metrics(off_by(position), Stretches(np.array([50]), np.array([99])))
-    assert scores["failures"] == 0.0
-    assert scores["growth"] == pytest.approx(0.1)
-    assert scores["t_recover"] == pytest.approx(0.1)
+    position[50:160] = 2.0
+    measured = off_by(position)
+    assert fault_metrics(measured, 0, ((5.0, 10.0),))["fault_t_recover"] == math.inf
+    for end_s in (20.0, math.inf):
+        scores = fault_metrics(measured, 0, ((5.0, end_s),))
+        assert math.isnan(scores["fault_t_recover"])
+        assert scores["fault_max_in_outage"] == 2.0
+
+
+@pytest.mark.parametrize("windows", [(), ((30.0, 40.0),), ((5.02, 5.08),)])
+def test_fault_without_an_instant_inside_says_nothing(off_by, windows):
+    scores = fault_metrics(off_by(np.full(200, 0.2)), 0, windows)
+    assert tuple(scores) == FAULT_IDS
+    assert all(map(math.isnan, scores.values()))
+
+
+def test_availability_is_unknown_where_instants_are_those_of_the_answers(off_by):
+    measured = off_by(np.full(200, 0.2))._replace(weight=np.ones(200))
+    scores = fault_metrics(measured, 0, ((5.0, 10.0),))
+    assert math.isnan(scores["fault_availability"])
+    assert scores["fault_max_in_outage"] == pytest.approx(0.2)
 
 
 def test_silence_is_counted_and_timed_up_to_the_next_answer(off_by):

@@ -8,14 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.metrics.deviation import errors
-from benchmarks.metrics.trajectory import (
-    Poses,
-    ahead,
-    relative_errors,
-    relative_pose_metrics,
-    step_metrics,
-    velocity_metrics,
-)
+from benchmarks.metrics.trajectory import Poses, ahead, relative_errors, trajectory_metrics
 from fusion import Pose
 
 ANGLES, PLACES = st.floats(-3.0, 3.0), st.floats(-20.0, 20.0)
@@ -50,14 +43,14 @@ def test_an_estimate_that_is_moved_and_turned_as_a_whole_has_no_relative_error(s
     instants, _ = straight()
     yaw = 0.7
     said = answers_of(3.0 + np.cos(yaw) * instants.x, -2.0 + np.sin(yaw) * instants.x, np.full(600, yaw))
-    scores = relative_pose_metrics(errors(instants, said))
+    scores = trajectory_metrics(errors(instants, said))
     assert scores["rpe_d_5m_rmse"] == pytest.approx(0.0, abs=1e-12)
     assert scores["rpe_t_10s_rot_rmse"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_odometry_that_is_two_percent_long_errs_by_two_percent_of_the_distance(straight):
     instants, answers = straight()
-    scores = relative_pose_metrics(errors(instants, answers._replace(x=1.02 * answers.x)))
+    scores = trajectory_metrics(errors(instants, answers._replace(x=1.02 * answers.x)))
     for reach in (1, 5, 10):
         assert scores[f"rpe_d_{reach}m_rmse"] == pytest.approx(0.02 * reach, rel=1e-9)
         assert scores[f"rpe_d_{reach}m_median"] == pytest.approx(0.02 * reach, rel=1e-9)
@@ -80,22 +73,22 @@ def test_pairs_without_an_answer_at_both_ends_do_not_count(straight):
     instants, answers = straight()
     valid = np.ones(600, dtype=bool)
     valid[100] = False
-    scores = relative_pose_metrics(errors(instants, answers._replace(valid=valid)))
+    scores = trajectory_metrics(errors(instants, answers._replace(valid=valid)))
     assert scores["rpe_t_1s_n"] == 590.0 - 2.0
 
 
 def test_relative_errors_need_headings_and_velocities_do_not(straight):
     instants, answers = straight(heading=np.full(600, np.nan))
     measured = errors(instants, answers)
-    assert relative_pose_metrics(measured)["rpe_d_1m_n"] == 0.0
-    assert math.isnan(relative_pose_metrics(measured)["rpe_d_1m_rmse"])
-    assert velocity_metrics(measured)["vel_err"] == 0.0
+    assert trajectory_metrics(measured)["rpe_d_1m_n"] == 0.0
+    assert math.isnan(trajectory_metrics(measured)["rpe_d_1m_rmse"])
+    assert trajectory_metrics(measured)["vel_err"] == 0.0
 
 
 def test_a_pair_needs_a_heading_at_both_ends(straight):
     heading = np.zeros(600)
     heading[100] = np.nan
-    scores = relative_pose_metrics(errors(*straight(heading=heading)))
+    scores = trajectory_metrics(errors(*straight(heading=heading)))
     assert scores["rpe_t_1s_n"] == 590.0 - 2.0
     assert scores["rpe_t_1s_rot_rmse"] == scores["rpe_t_1s_rot_median"] == 0.0
 
@@ -103,7 +96,7 @@ def test_a_pair_needs_a_heading_at_both_ends(straight):
 def test_velocity_error_of_a_drift_is_the_drift(straight):
     instants, answers = straight()
     drifting = answers._replace(x=answers.x + 0.03 * np.arange(600) / 10.0, y=answers.y - 0.04 * np.arange(600) / 10.0)
-    scores = velocity_metrics(errors(instants, drifting))
+    scores = trajectory_metrics(errors(instants, drifting))
     assert scores["vel_err"] == pytest.approx(0.05, rel=1e-9)
     assert scores["vel_err_p95"] == pytest.approx(0.05, rel=1e-9)
 
@@ -111,23 +104,23 @@ def test_velocity_error_of_a_drift_is_the_drift(straight):
 def test_one_step_aside_and_back_is_two_jumps(straight):
     instants, answers = straight(n=601)
     answers.y[300] += 1.0
-    scores = step_metrics(errors(instants, answers))
+    scores = trajectory_metrics(errors(instants, answers))
     assert scores["jump_rate"] == pytest.approx(2.0, rel=1e-9)
     assert scores["path_ratio"] == pytest.approx((30.0 - 0.1 + 2.0 * math.hypot(1.0, 0.05)) / 30.0, rel=1e-9)
 
 
 def test_a_step_is_a_jump_only_beyond_what_the_speed_allows(straight):
     instants, answers = straight(speed=1.9)
-    assert step_metrics(errors(instants, answers))["jump_rate"] == 0.0
-    assert step_metrics(errors(instants, answers), top_speed_m_s=0.5)["jump_rate"] == pytest.approx(600.0)
+    assert trajectory_metrics(errors(instants, answers))["jump_rate"] == 0.0
+    assert trajectory_metrics(errors(instants, answers), top_speed_m_s=0.5)["jump_rate"] == pytest.approx(600.0)
 
 
 def test_an_estimate_held_for_a_second_does_not_jump_when_the_next_one_comes(straight):
     instants, answers = straight(speed=1.5)
     held = np.arange(600) // 10 * 10
     answers = answers._replace(x=answers.x[held], age_s=(np.arange(600) - held) / 10.0)
-    assert step_metrics(errors(instants, answers))["jump_rate"] == 0.0
-    assert step_metrics(errors(instants, answers._replace(age_s=np.zeros(600))))["jump_rate"] > 0.0
+    assert trajectory_metrics(errors(instants, answers))["jump_rate"] == 0.0
+    assert trajectory_metrics(errors(instants, answers._replace(age_s=np.zeros(600))))["jump_rate"] > 0.0
 
 
 def test_frames_may_be_paired_instead_of_times(oracle_a):

@@ -1,5 +1,6 @@
 """A suite is computed once: whatever the workers, the order, the shards, or how often it was interrupted."""
 
+import csv
 import json
 import os
 import signal
@@ -11,10 +12,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.metrics.archive import from_bytes
+from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.score import errors
+from benchmarks.prior import begin_ns
 from benchmarks.runner.definition import load_suite
 from benchmarks.runner.execute import carry_out, faulty_run
+from benchmarks.runner.export_verb import as_csv
 from benchmarks.runner.plan import cells_of, missing, shard
-from benchmarks.runner.results import leaderboard, read_results
+from benchmarks.runner.results import flat, leaderboard, read_results
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store
@@ -133,6 +139,58 @@ def test_faults_are_drawn_alike_for_every_estimator_and_leave_the_truth_alone(tm
     clean = open_run(noisy[0].run, noisy[0].folder)
     assert wheels.measurements == pf.measurements != clean.measurements
     assert wheels.truth is clean.truth
+
+
+OUTAGES = """
+[suite]
+name = "outages"
+[[runs]]
+id = "office"
+scenario = "office"
+duration_s = 30.0
+[[estimators]]
+id = "radio"
+use = "radio_only"
+[[faults]]
+id = "ap2-out"
+apply = [{ kind = "drop", topic = "wifi", source = "ap2", windows = [[8.0, 16.0]] }]
+[[faults]]
+id = "silence"
+apply = [{ kind = "drop", topic = "wifi", windows = [[8.0, 16.0]] }]
+[[faults]]
+id = "noise"
+apply = [{ kind = "rssi_noise", std_db = 6.0 }]
+"""
+
+
+def test_dropped_window_is_scored_by_itself(tmp_path):
+    """Against the stored track: what is inside is what lies 8 s to 16 s after the first message."""
+    (tmp_path / "outages.toml").write_text(OUTAGES, encoding="utf-8")
+    suite, store = load_suite(tmp_path / "outages.toml"), Store(tmp_path / "store")
+    results = {result.cell.fault.id: result for result in run_suite(suite, store, workers=1)}
+    run = open_run(suite.runs[0], suite.folder)
+    elapsed_s = (evaluation_instants(run.truth).time_ns - begin_ns(run.measurements)) / 1e9
+    errors_m = {}
+    for name in ("clean", "ap2-out", "silence"):
+        track, _ = from_bytes(store.read("estimates", results[name].cell.estimate_key, "track.npz"))
+        instants = evaluation_instants(run.truth)
+        errors_m[name] = errors(instants, match(instants, track)).position
+    inside = (elapsed_s >= 8.0) & (elapsed_s < 16.0)
+    assert (errors_m["ap2-out"] == errors_m["clean"])[elapsed_s < 8.0].all()
+    for name in ("ap2-out", "silence"):
+        found, own = results[name].metrics, errors_m[name][inside]
+        assert found["fault_availability"] == np.isfinite(own).mean()
+        assert found["fault_max_in_outage"] == own[np.isfinite(own)].max()
+        assert found["fault_t_recover"] >= 0.0
+    # The newest fix before the silence counts for another second, which one dropped anchor does not take away.
+    assert results["silence"].metrics["fault_availability"] < 0.2 < results["ap2-out"].metrics["fault_availability"]
+    assert results["ap2-out"].metrics["fault_max_in_outage"] != errors_m["clean"][inside].max()
+    rows = {row["fault"]: row for row in csv.DictReader(as_csv([*results.values()]).decode().splitlines())}
+    assert rows["clean"]["fault_availability"] == rows["noise"]["fault_availability"] == ""
+    assert float(rows["silence"]["fault_availability"]) == results["silence"].metrics["fault_availability"]
+    noise = flat(results["noise"])
+    assert all(noise[name] is None for name in noise if name.startswith("fault_"))
+    assert not any(name.startswith("fault_") for name in results["clean"].metrics)
 
 
 def test_log_is_told_by_its_content_not_by_its_name(tmp_path):
