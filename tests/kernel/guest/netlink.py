@@ -96,7 +96,7 @@ class Family:
 
     def __init__(self, name: str) -> None:
         self.socket = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, GENERIC)
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 23)
         self.socket.bind((0, 0))
         self._sequence = 0
         about = self._ask(CONTROLLER, GET_FAMILY, attribute(FAMILY_NAME, name.encode() + b"\0"))

@@ -15,6 +15,8 @@ from kernel.guest.world import Air
 CHANNELS = (1, 6, 11)
 FREQUENCIES_MHZ = (2412, 2437, 2462)
 
+LARGEST_BUFFER = Path("/proc/sys/net/core/rmem_max")
+
 CONFIGURATION = """\
 interface=wlan{number}
 driver=nl80211
@@ -28,6 +30,7 @@ ctrl_interface=/run/hostapd
 @contextmanager
 def air_with_radios(air: Air) -> Iterator[Medium]:
     """Radios for the robot and each access point of `air`, and the medium between them; all interfaces down."""
+    LARGEST_BUFFER.write_text(str(1 << 24))  # on a busy host frames queue up; when they are lost, the medium is
     load("mac80211_hwsim", "radios=0")
     add_radios(1 + len(air.access_points))
     with registered(air) as medium:
