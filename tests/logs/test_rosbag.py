@@ -26,6 +26,9 @@ POSES = ((1, 0.0, 0.0, 0.0), (2, 1.0, 0.0, 0.0), (3, 1.5, 0.5, math.pi / 2), (4,
 """Time [s] and pose of the robot's own odometry: straight on, a quarter circle, straight on."""
 CHORD_M = math.sqrt(0.5)
 
+GRAVITY = (0.0, 0.0, 9.81)
+"""What the IMU of the test bags feels."""
+
 
 @pytest.fixture
 def drive(ros):
@@ -45,7 +48,7 @@ def of(run, kind):
 def test_every_role_is_read_with_its_exact_numbers(tmp_path, ros, drive):
     run = read_bag(ros.bag(tmp_path / "walk", drive), WORLD, {"truth": "/mocap"})
     assert (run.name, run.world, run.warnings, dict(run.lanes)) == ("walk", WORLD, (), {})
-    assert of(run, Gyro) == [Gyro(t * SECOND, "/imu/data", t - 1, 0.1 * t) for t in range(1, 5)]
+    assert of(run, Gyro) == [Gyro(t * SECOND, "/imu/data", t - 1, 0.1 * t, GRAVITY) for t in range(1, 5)]
     assert of(run, Ranges) == [
         Ranges(2 * SECOND, "/uwb/a", 0, (RangeReading("a", 2.5),)),
         Ranges(2 * SECOND, "/uwb/b", 0, (RangeReading("b", 4.5),)),
@@ -92,7 +95,7 @@ def test_measurements_come_in_the_order_they_arrived_and_late_odometry_is_chaine
     ]
     run = read_bag(ros.bag(tmp_path / "bag", rows), WORLD)
     assert run.measurements == (
-        Gyro(2 * SECOND, "/imu", 0, 0.5),
+        Gyro(2 * SECOND, "/imu", 0, 0.5, GRAVITY),
         Odometry(2 * SECOND, "/odom", 0, 1 * SECOND, 1.5, 0.0),
         Odometry(3 * SECOND, "/odom", 1, 2 * SECOND, 0.5, 0.0),
     )
@@ -172,7 +175,7 @@ def test_odometry_is_preferred_to_wheels_and_both_are_refused(tmp_path, ros, dri
 def test_imu_that_measures_no_rate_is_counted(tmp_path, ros):
     rows = [("/imu", t * SECOND, ros.imu(t * SECOND, 0.5, measured=t == 2)) for t in range(1, 4)]
     run = read_bag(ros.bag(tmp_path / "bag", rows), WORLD)
-    assert run.measurements == (Gyro(2 * SECOND, "/imu", 0, 0.5),)
+    assert run.measurements == (Gyro(2 * SECOND, "/imu", 0, 0.5, GRAVITY),)
     assert "2 messages of /imu cannot be decoded" in run.warnings[0]
 
 
