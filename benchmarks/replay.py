@@ -51,9 +51,12 @@ def replay(
 
 
 def _verify(earlier: Path, lane: Lane) -> None:
-    kept = read_run(earlier).metadata.get("digest")
+    metadata = read_run(earlier).metadata
+    kept = metadata.get("digest") or json.loads(metadata.get("live_digests", "{}")).get(lane.name)
     if kept is None:
-        raise LogError(f"{earlier}: holds no digest; give a log that `fusion replay` wrote")
+        raise LogError(
+            f"{earlier}: holds no digest of {lane.name}; give a log that `fusion replay` or `fusion live -o` wrote"
+        )
     if kept != lane.digest:
         raise LogError(
             f"{earlier}: its digest is {kept}, this replay's is {lane.digest}; compare seed, parameters and versions"

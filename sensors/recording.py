@@ -147,7 +147,6 @@ class Recorder:
 
 
 def _as_remark(status: Status, now_ns: int) -> Remark:
-    values = [(key, str(value)) for key, value in status._asdict().items() if value not in (None, "")]
+    values = tuple((key, str(value)) for key, value in status.record.items() if value not in (None, ""))
     level = {State.RUNNING: Level.OK, State.FAILED: Level.ERROR}.get(status.state, Level.WARN)
-    named = dict(values) | {"state": status.state.value}
-    return Remark(now_ns, status.name, level, "status", tuple(named.items()))
+    return Remark(now_ns, status.name, level, "status", values)

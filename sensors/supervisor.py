@@ -39,6 +39,11 @@ class Status(NamedTuple):
     losses: int
     error: str
 
+    @property
+    def record(self) -> dict[str, object]:
+        """The same as values that JSON knows."""
+        return self._asdict() | {"state": self.state.value}
+
 
 def true_ns(received: Received) -> int:
     """When it was true: never after it was received, for a clock that is ahead makes nothing fresher."""
