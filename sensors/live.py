@@ -21,7 +21,7 @@ from sensors.keeper import Received
 from sensors.live_lane import Lane
 from sensors.recording import Answers, Recorder, check_policy
 from sensors.robot_file import RobotFile
-from sensors.sensing import PATIENCE_S, Sensing, Turn
+from sensors.sensing import PATIENCE_S, Sensing, Turn, check_duration
 from sensors.supervisor import Status
 
 FASTEST_HZ = 1000.0
@@ -85,6 +85,7 @@ def live(
         raise ParameterError(f"hz {hz:g}: give a rate above zero, at most {FASTEST_HZ:g}")
     if shadows and folder is None:
         raise ParameterError(f"shadow {shadows[0]!r}: nobody would hear it; say where to record, with -o FOLDER")
+    check_duration(duration_s)
     contestants = _contestants(robot.world, [estimator, *shadows], options or {}, seed)
     sensing = Sensing(robot)
     if folder is not None:
@@ -202,6 +203,8 @@ class _Fold:
     def _notice(self, now_ns: int) -> None:
         """Tell once of every lane that ended, and of the recording."""
         for lane in self._lanes:
+            if self._recorder and lane.name in self._recorder.refused:
+                lane.end(self._recorder.refused[lane.name])
             if lane.error and lane.name not in self._troubles:
                 self._tell(lane.name, lane.error, now_ns)
         if self._recorder and self._recorder.trouble:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from fusion import Estimate, Estimator, FusionError, Measurement, Prior, Tracker, Update, World
+from fusion import Covariance, Estimate, Estimator, FusionError, Measurement, Pose, Prior, Tracker, Update, World
 from fusion.certificate import Certificate
 
 Answer = TypeVar("Answer")
@@ -26,7 +26,11 @@ class Lane:
 
     def estimate(self, time_ns: int) -> Estimate | None:
         """Its belief at ``time_ns``; None once it ended."""
-        return self._guarded(lambda: self._tracker.estimate(time_ns) if self._tracker else None)
+        return self._guarded(lambda: _plain(self._tracker.estimate(time_ns)) if self._tracker else None)
+
+    def end(self, error: str) -> None:
+        """Let it say no more, for a reason."""
+        self.error = self.error or error
 
     @property
     def digest(self) -> str:
@@ -49,3 +53,16 @@ class Lane:
         except Exception as unknown:  # noqa: BLE001 - a plug-in may fail in any way, and the others go on
             self.error = f"{self.name} failed: {unknown!r}; choose another estimator, or report it to its author"
         return None
+
+
+def _plain(estimate: Estimate) -> Estimate:
+    """The same in plain numbers, whatever arrays it was made with; raises where something in it is no number."""
+    claim, lost = estimate.covariance, estimate.p_lost
+    return estimate._replace(
+        time_ns=int(estimate.time_ns),
+        pose=Pose(*map(float, estimate.pose)),
+        covariance=None if claim is None else Covariance(*map(float, claim)),
+        valid=bool(estimate.valid),
+        heading_known=bool(estimate.heading_known),
+        p_lost=None if lost is None else float(lost),
+    )

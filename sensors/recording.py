@@ -9,11 +9,11 @@ from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import NamedTuple
 
-from fusion import Level, LogError, Prior, Remark, Update
+from fusion import Level, LogError, PluginError, Prior, Remark, Update
 from fusion.values import nanoseconds, seconds
 from sensors.keeper import Received, State
 from sensors.robot_file import Policy, RobotFile
-from sensors.sensing import PATIENCE_S, Report, Sensing, Turn
+from sensors.sensing import PATIENCE_S, Report, Sensing, Turn, check_duration
 from sensors.split_log import SplitLog, check_space
 from sensors.supervisor import Status
 
@@ -46,9 +46,10 @@ def record(
 ) -> Recorded:
     """Record until ``stop`` is set, the time is over, or it cannot go on; ``tell`` hears each second how sensors do.
 
-    Raises `LogError` where nothing can be written, `DriverError` where a required sensor does not open (unless
-    ``degraded``), both before anything is recorded.
+    Raises `ParameterError` for a duration that is none, `LogError` where nothing can be written, `DriverError` where a
+    required sensor does not open (unless ``degraded``), all before anything is recorded.
     """
+    check_duration(duration_s)
     sensing = Sensing(robot, fail_fast=fail_fast)
     check_policy(robot.policy, folder)
     with sensing:
@@ -73,7 +74,8 @@ def check_policy(policy: Policy, folder: Path) -> None:
 
 class Recorder:
     """Writes every turn into a log; a context manager, for one thread. ``trouble`` is why it cannot go on, "" while it
-    can: a disk that refuses something ends the recording, and nothing that is on it is lost.
+    can: a disk that refuses something ends the recording, and nothing that is on it is lost. ``refused``: lanes of
+    estimators that said something no log can hold, each with the reason; no more of those is written.
     """
 
     def __init__(
@@ -81,6 +83,7 @@ class Recorder:
     ) -> None:
         """Begin a log in ``folder``; ``about`` goes into its metadata. Raises `LogError` where none can be."""
         self.trouble = ""
+        self.refused: dict[str, str] = {}
         self._log = SplitLog(robot, folder, prior, about)
         self._due_ns = dict.fromkeys((self._look_at_disk, self._compare_clocks), prior.time_ns)
         self._every_s = {self._look_at_disk: DISK_S, self._compare_clocks: CLOCK_S}
@@ -108,7 +111,7 @@ class Recorder:
             for received, said in zip(turn.received, repeat(()) if answers is None else answers, strict=False):
                 self._log.write(received)
                 for lane, update in said:
-                    self._log.write_update(lane, update, received.received_ns)
+                    self._write_update(lane, update, received.received_ns)
             if turn.report is not None:
                 self._keep(turn.report, turn.now_ns)
             for task in [task for task, due_ns in self._due_ns.items() if due_ns <= turn.now_ns]:
@@ -131,6 +134,14 @@ class Recorder:
             self._log.write(Received(remark.time_ns, remark))
         except LogError as error:
             self.trouble = str(error)
+
+    def _write_update(self, lane: str, update: Update, now_ns: int) -> None:
+        if lane in self.refused:
+            return
+        try:
+            self._log.write_update(lane, update, now_ns)
+        except PluginError as error:
+            self.refused[lane] = str(error)
 
     def _keep(self, report: Report, now_ns: int) -> None:
         self._log.write_devices(report.devices, now_ns)

@@ -6,12 +6,13 @@ sensor does. The heartbeat for the service manager comes from here, so that a ca
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import NamedTuple
 
-from fusion import BootClock, DeviceInfo, NotFoundError
+from fusion import BootClock, DeviceInfo, NotFoundError, ParameterError
 from fusion.values import nanoseconds, seconds
 from sensors.computer import tell_service_manager
 from sensors.keeper import Keeper, Received, State
@@ -122,6 +123,14 @@ class Sensing:
         if failed and self._fail_fast:
             self.end(failed[0].error)
         return Report(statuses, {keeper.name: keeper.info for keeper in self._keepers if keeper.info is not None})
+
+
+def check_duration(duration_s: float | None) -> None:
+    """Refuse a time that is none, with a `ParameterError`."""
+    if duration_s is not None and not 0.0 < duration_s < math.inf:
+        raise ParameterError(
+            f"duration {duration_s} s: must be a time greater than zero; leave it out to go on until stopped"
+        )
 
 
 class _Pace:

@@ -73,12 +73,20 @@ class SaysNonsense(Breaks):
         return Estimate(time_ns, Pose("here", 0.0, 0.0), None)
 
 
+class HasNoMessage(Breaks):
+    """Its heading is a number that no quaternion holds."""
+
+    def step(self, state, measurement):
+        return state._replace(heading=math.inf) if isinstance(measurement, WifiScan) else state, ()
+
+
 @pytest.fixture(autouse=True)
 def _estimators():
     with (
         fusion.registered("breaks", Breaks),
         fusion.registered("never_starts", NeverStarts),
         fusion.registered("says_nonsense", SaysNonsense),
+        fusion.registered("has_no_message", HasNoMessage),
     ):
         yield
 
@@ -201,7 +209,7 @@ def test_old_stamps_are_old_though_they_come_now(robot):
         assert now.statuses[1].age_s >= (now.time_ns - told[0].time_ns) / 1e9
 
 
-@pytest.mark.parametrize("name", ["breaks", "never_starts", "says_nonsense"])
+@pytest.mark.parametrize("name", ["breaks", "never_starts", "says_nonsense", "has_no_message"])
 def test_an_estimator_that_fails_ends_its_own_lane_and_is_told_once(robot, tmp_path, name):
     told, ended = lived(robot(), name, 1.6, folder=tmp_path / "out", shadows=["ekf"])
     assert told[-1].estimate is None
@@ -278,6 +286,9 @@ def test_what_cannot_be_is_refused_before_anything_runs(robot, tmp_path):
     for hz in (0.0, -1.0, math.nan, 1e6):
         with pytest.raises(ParameterError, match="hz"):
             live(one, "ekf", hz=hz)
+    for duration_s in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(ParameterError, match="duration"):
+            live(one, "ekf", duration_s=duration_s)
     assert not folder.exists()
 
 
