@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -19,6 +18,7 @@ from benchmarks.progress import Progress, progress_bar
 from benchmarks.workers import Loss, compute
 from fusion import LogError, ParameterError
 from fusion.errors import did_you_mean
+from fusion.options import parse_value
 
 POOLED = "all runs"
 LOST = "the worker process died, twice; run it alone with --workers 1 to see why"
@@ -106,14 +106,6 @@ def parse_settings(words: Sequence[str]) -> dict[str, dict[str, object]]:
             raise ParameterError(f"--set {word}: expected ESTIMATOR.PARAMETER=VALUE, as in ekf.gate_probability=0.99")
         settings.setdefault(estimator, {})[parameter] = parse_value(value)
     return settings
-
-
-def parse_value(text: str) -> object:
-    """A JSON value, or the text itself where it is none."""
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError:
-        return text
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

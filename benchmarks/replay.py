@@ -6,14 +6,14 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import fusion
-from benchmarks.bench import parse_value
 from benchmarks.lane import Lane, run_lane
 from benchmarks.metrics.track import Track
 from fusion import LogError, ParameterError, PluginError, Truth
+from fusion.options import parse_options
 from logs.reader import read_run
 from logs.run import Run, TruthTrack
 from logs.writer import RunWriter
@@ -51,9 +51,12 @@ def replay(
 
 
 def _verify(earlier: Path, lane: Lane) -> None:
-    kept = read_run(earlier).metadata.get("digest")
+    metadata = read_run(earlier).metadata
+    kept = metadata.get("digest") or json.loads(metadata.get("live_digests", "{}")).get(lane.name)
     if kept is None:
-        raise LogError(f"{earlier}: holds no digest; give a log that `fusion replay` wrote")
+        raise LogError(
+            f"{earlier}: holds no digest of {lane.name}; give a log that `fusion replay` or `fusion live -o` wrote"
+        )
     if kept != lane.digest:
         raise LogError(
             f"{earlier}: its digest is {kept}, this replay's is {lane.digest}; compare seed, parameters and versions"
@@ -114,19 +117,9 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.run,
         arguments.estimator,
         arguments.output,
-        options=_options(arguments.set),
+        options=parse_options(arguments.set),
         seed=arguments.seed,
         verify=arguments.verify,
     )
     sys.stdout.write(f"{digest}\n")
     return 0
-
-
-def _options(words: Sequence[str]) -> dict[str, object]:
-    options: dict[str, object] = {}
-    for word in words:
-        key, equals, value = word.partition("=")
-        if not equals or not key:
-            raise ParameterError(f"--set {word}: expected PARAMETER=VALUE, as in gate_probability=0.99")
-        options[key] = parse_value(value)
-    return options

@@ -27,6 +27,7 @@ VERBS = {
     "demo": Verb("benchmarks.demo", "the whole promise in one command: simulate, record, score, show"),
     "simulate": Verb("sensors.simulate", "drive a simulated robot and record it as an MCAP log"),
     "record": Verb("sensors.record", "the sensors of a robot into logs, until somebody says stop"),
+    "live": Verb("sensors.live_verb", "where the robot is, now: sensors through an estimator, a line of JSON a pose"),
     "doctor": Verb("sensors.doctor", "everything a recording needs, and the cure for what is wrong"),
     "sensors": Verb("sensors.devices", "what drivers are installed, and which devices are there"),
     "join": Verb("logs.joining", "the files of one recording become one log"),

@@ -44,6 +44,14 @@ class Pose(NamedTuple):
         return self.x + c * x - s * y, self.y + s * x + c * y
 
 
+class Ellipse(NamedTuple):
+    """One standard deviation of a position [m] along the two axes of its ellipse; ``angle`` of the major one [rad]."""
+
+    major_std: float
+    minor_std: float
+    angle: float
+
+
 class Covariance(NamedTuple):
     """The six different numbers of a symmetric 3x3 covariance of (x, y, heading), map frame, [m^2, m rad, rad^2]."""
 
@@ -72,3 +80,14 @@ class Covariance(NamedTuple):
             (self.xy, self.yy, self.yh),
             (self.xh, self.yh, self.hh),
         )
+
+    @property
+    def ellipse(self) -> Ellipse:
+        """The ellipse of the position: roots of the eigenvalues of [[xx, xy], [xy, yy]], in closed form.
+
+        >>> Covariance(2.5, 1.5, 0.0, 2.5, 0.0, 0.0).ellipse == (2.0, 1.0, math.pi / 4)
+        True
+        """
+        middle, half = 0.5 * (self.xx + self.yy), math.hypot(0.5 * (self.xx - self.yy), self.xy)
+        angle = 0.5 * math.atan2(2.0 * self.xy, self.xx - self.yy)
+        return Ellipse(math.sqrt(max(middle + half, 0.0)), math.sqrt(max(middle - half, 0.0)), angle)

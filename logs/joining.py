@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -33,7 +33,7 @@ def join(files: Sequence[Path], output: Path) -> tuple[str, ...]:
     if output.exists():
         raise LogError(f"{output}: is there already; remove it, or choose another name")
     first = parts[0].about
-    about = {key: value for key, value in first.items() if key not in ("name", "world", "world_hash", "split")}
+    about = _common(first)
     warnings = list(_gaps(parts))
     world = World.from_table(json.loads(first["world"]))
     with RunWriter(output, world, name=parts[0].recording, metadata=about) as log:
@@ -42,7 +42,14 @@ def join(files: Sequence[Path], output: Path) -> tuple[str, ...]:
             for source, message in walk:
                 log.copy(source.topic, source.type, message)
             warnings += walk.warnings
+        if late := {key: value for key, value in _common(walk.metadata[RUN_RECORD]).items() if key not in about}:
+            log.note(late)  # what the recorder knew only at its end stands in the last file
     return tuple(warnings)
+
+
+def _common(about: Mapping[str, str]) -> dict[str, str]:
+    """What the metadata of one file say of the whole recording."""
+    return {key: value for key, value in about.items() if key not in ("name", "world", "world_hash", "split")}
 
 
 def _parts(files: Sequence[Path]) -> list[Part]:

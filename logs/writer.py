@@ -20,7 +20,7 @@ from typing import IO
 from mcap.records import Message
 from mcap.writer import Writer
 
-from fusion import LogError, Measurement, Prior, Remark, Truth, Update, World
+from fusion import LogError, Measurement, PluginError, Prior, Remark, Truth, Update, World
 from fusion.values import nanoseconds
 from logs import device_messages, messages
 from logs.device_messages import ClockSync
@@ -97,16 +97,35 @@ class RunWriter:
         """Append how the clocks of this computer stand to each other."""
         self._add(*device_messages.CLOCKS, sync.boot_ns, sync.boot_ns, 0, device_messages.encode_clock(sync))
 
-    def write_update(self, lane: str, update: Update) -> None:
-        """Append what an estimator said: its estimate (if valid) and the fates of the readings."""
+    def write_update(self, lane: str, update: Update, *, log_time_ns: int | None = None) -> None:
+        """Append what an estimator said: its estimate (if valid) and the fates of the readings; ``log_time_ns`` says
+        when, if not at the time it is about. Raises `PluginError` for what no message can hold.
+        """
         estimate, measurement = update.estimate, update.measurement
         stamp = estimate.time_ns
-        if estimate.valid:
+        log_ns = stamp if log_time_ns is None else log_time_ns
+        try:
+            said = messages.encode_estimate(estimate) if estimate.valid else b""
+            fates = (
+                messages.encode_fates(measurement.time_ns, measurement.sensor, update.fates) if update.fates else b""
+            )
+        except Exception as error:
+            raise PluginError(
+                f"{lane}: what it said to {measurement.sensor!r} at {measurement.time_ns} ns fits no message "
+                f"({error!r}); report it to its author"
+            ) from error
+        if said:
             schema = "geometry_msgs/msg/PoseWithCovarianceStamped"
-            self._add(ESTIMATE_TOPIC + lane, schema, stamp, stamp, 0, messages.encode_estimate(estimate))
-        if update.fates:
-            fates = messages.encode_fates(measurement.time_ns, measurement.sensor, update.fates)
-            self._add(FATES_TOPIC + lane, FATES, stamp, measurement.time_ns, measurement.seq, fates)
+            self._add(ESTIMATE_TOPIC + lane, schema, log_ns, stamp, 0, said)
+        if fates:
+            self._add(FATES_TOPIC + lane, FATES, log_ns, measurement.time_ns, measurement.seq, fates)
+
+    def note(self, about: Mapping[str, str]) -> None:
+        """Add to the metadata what was not known when the log was begun; what is there already is replaced."""
+        try:
+            self._writer.add_metadata(RUN_RECORD, dict(about))
+        except OSError as error:
+            raise LogError(f"{self._path}: could not be written ({error}); free some space") from error
 
     def copy(self, topic: str, schema: str, message: Message) -> None:
         """Append a message of another log as it stands; raises `LogError` for a type that no log of ours holds."""

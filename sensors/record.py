@@ -5,50 +5,14 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 
-from sensors.keeper import State
 from sensors.recording import Recorded, record
 from sensors.robot_file import RobotFile
-from sensors.supervisor import Status
-
-
-@contextmanager
-def stopped_by_signals(stop: threading.Event) -> Iterator[None]:
-    """Ctrl-C and SIGTERM set ``stop`` instead of ending the program, for the length of a ``with`` block."""
-
-    def set_stop(_signal: int, _frame: FrameType | None) -> None:
-        stop.set()
-
-    before = {number: signal.signal(number, set_stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def status_line(statuses: Sequence[Status]) -> str:
-    """How all sensors do, in one line.
-
-    >>> status_line([Status("gyro", State.RUNNING, 99.96, 0.01, 400, 0, 0, ""),
-    ...              Status("wifi", State.BACKOFF, None, 4.2, 12, 3, 1, "wlan0 is down")])
-    'gyro 100.0 Hz | wifi backoff 4.2 s ago (3 dropped)'
-    """
-    parts = []
-    for status in statuses:
-        age = "" if status.age_s is None else f" {status.age_s:.1f} s ago"
-        rate = "waiting" if status.rate_hz is None else f"{status.rate_hz:.1f} Hz"
-        dropped = f" ({status.dropped} dropped)" if status.dropped else ""
-        doing = rate if status.state is State.RUNNING else status.state.value + age
-        parts.append(f"{status.name} {doing}{dropped}")
-    return " | ".join(parts)
+from sensors.signals import stopped_by_signals
+from sensors.status_line import StatusTeller, totals
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -75,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
             duration_s=arguments.duration,
             degraded=arguments.degraded,
             fail_fast=arguments.fail_fast,
-            tell=_teller(),
+            tell=StatusTeller().tell,
         )
     sys.stderr.write("\n")
     sys.stdout.write(_json(recorded) if arguments.json else _text(recorded))
@@ -91,25 +55,8 @@ def _with_policy(robot: RobotFile, arguments: argparse.Namespace) -> RobotFile:
     return dataclasses.replace(robot, policy=dataclasses.replace(robot.policy, **changes))
 
 
-def _teller() -> Callable[[Sequence[Status]], None]:
-    """Writes the status line: over itself on a terminal, once a change of state elsewhere."""
-    last: list[list[State]] = []
-
-    def tell(statuses: Sequence[Status]) -> None:
-        states = [status.state for status in statuses]
-        if sys.stderr.isatty():
-            sys.stderr.write(f"\r\x1b[K{status_line(statuses)}")
-            sys.stderr.flush()
-        elif last != [states]:
-            last[:] = [states]
-            sys.stderr.write(status_line(statuses) + "\n")
-
-    return tell
-
-
 def _text(recorded: Recorded) -> str:
-    rows = [f"{s.name}: {s.messages} messages, {s.dropped} dropped, lost {s.losses} times" for s in recorded.statuses]
-    return "\n".join([f"{recorded.duration_s:.1f} s", *rows, *map(str, recorded.paths)]) + "\n"
+    return "\n".join([f"{recorded.duration_s:.1f} s", *totals(recorded.statuses), *map(str, recorded.paths)]) + "\n"
 
 
 def _json(recorded: Recorded) -> str:
@@ -117,6 +64,6 @@ def _json(recorded: Recorded) -> str:
         "paths": [str(path) for path in recorded.paths],
         "duration_s": recorded.duration_s,
         "trouble": recorded.trouble,
-        "sensors": [status._asdict() | {"state": status.state.value} for status in recorded.statuses],
+        "sensors": [status.record for status in recorded.statuses],
     }
     return json.dumps(about, indent=2) + "\n"

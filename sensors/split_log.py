@@ -11,9 +11,9 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 
-from fusion import DeviceInfo, Level, LogError, Prior, Remark, Truth, __version__
+from fusion import DeviceInfo, Level, LogError, Prior, Remark, Truth, Update, __version__
 from fusion.values import nanoseconds
 from logs.writer import RunWriter
 from sensors.computer import boot_id, clock_sync, free_bytes
@@ -29,11 +29,14 @@ ROBOT_FILE = "robot.toml"
 class SplitLog:
     """Where a recording goes; a context manager, owned by one thread. Raises `LogError` where it cannot be written."""
 
-    def __init__(self, robot: RobotFile, folder: Path, prior: Prior) -> None:
+    def __init__(
+        self, robot: RobotFile, folder: Path, prior: Prior, about: Mapping[str, str] = MappingProxyType({})
+    ) -> None:
+        """Begin the first file; ``about`` goes into the metadata of every one."""
         self.paths: list[Path] = []
         self._robot = robot
         self._folder = folder
-        self._prior = prior
+        self._about = about
         self._stem = f"{_plain(robot.name)}-{boot_id()}"
         self._number = _next_number(folder, self._stem)
         self._first = f"{self._stem}-{self._number:04d}"
@@ -48,6 +51,10 @@ class SplitLog:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Finish the last file."""
         self._log.close()
 
     def write(self, received: Received) -> None:
@@ -61,6 +68,14 @@ class SplitLog:
             self._log.write(said, log_time_ns=at_ns)
         for remark in self._standstill.hear(said):
             self._log.write_remark(remark, log_time_ns=at_ns)
+
+    def write_update(self, lane: str, update: Update, now_ns: int) -> None:
+        """Append what the estimator of ``lane`` said to what was received at ``now_ns``."""
+        self._log.write_update(lane, update, log_time_ns=now_ns)
+
+    def note(self, about: Mapping[str, str]) -> None:
+        """Add what is known only at the end to the metadata of the last file."""
+        self._log.note(about)
 
     def write_clock(self) -> None:
         """Append how the clocks stand now."""
@@ -100,6 +115,7 @@ class SplitLog:
     def _begin(self, prior: Prior | None) -> RunWriter:
         path = self._folder / f"{self._stem}-{self._number:04d}.mcap"
         about = {
+            **self._about,
             "source": "recorded",
             "recording": self._first,
             "split": str(len(self.paths)),

@@ -28,7 +28,7 @@ RATE_SPAN = 20
 
 
 class Status(NamedTuple):
-    """How a sensor does. ``rate_hz`` and ``age_s`` are None before it said anything worth counting."""
+    """How a sensor does. ``rate_hz`` and ``age_s``, that of its freshest measurement, are None before there is one."""
 
     name: str
     state: State
@@ -38,6 +38,16 @@ class Status(NamedTuple):
     dropped: int
     losses: int
     error: str
+
+    @property
+    def record(self) -> dict[str, object]:
+        """The same as values that JSON knows."""
+        return self._asdict() | {"state": self.state.value}
+
+
+def true_ns(received: Received) -> int:
+    """When it was true: never after it was received, for a clock that is ahead makes nothing fresher."""
+    return min(received.said.time_ns, received.received_ns)
 
 
 class Mailbox:
@@ -51,6 +61,7 @@ class Mailbox:
         self.messages = 0
         self.dropped = 0
         self.latest: Received | None = None
+        """The freshest measurement, which need not be the one that came last."""
 
     def put(self, received: Sequence[Received]) -> None:
         """Add what came."""
@@ -62,7 +73,7 @@ class Mailbox:
             for one in received:
                 if not isinstance(one.said, Remark):
                     self.messages += 1
-                    self.latest = one
+                    self.latest = one if self.latest is None or true_ns(one) >= true_ns(self.latest) else self.latest
                     self._arrivals_ns.append(one.received_ns)
 
     def take(self) -> list[Received]:
@@ -89,6 +100,7 @@ class Supervisor:
         self._clock = clock
         self._stopping = threading.Event()
         self._news = threading.Event()
+        self._taken_ns = 0
         self._threads = [
             threading.Thread(target=self._serve, args=(keeper,), name=keeper.name, daemon=True) for keeper in keepers
         ]
@@ -120,17 +132,24 @@ class Supervisor:
         keeper.close()
 
     def take(self, timeout_s: float) -> list[Received]:
-        """What came from all sensors, by time of arrival; waits at most ``timeout_s`` for the first of it."""
+        """What came from all sensors, by time of arrival; waits at most ``timeout_s`` for the first of it.
+
+        What was held up on its way into the queue counts as received with the last that was handed out before it:
+        arrivals never run backwards, for a log is read in their order.
+        """
         self._news.wait(timeout_s)
         self._news.clear()
-        return sorted((one for box in self._boxes.values() for one in box.take()), key=lambda one: one.received_ns)
+        came = sorted((one for box in self._boxes.values() for one in box.take()), key=lambda one: one.received_ns)
+        taken = [one._replace(received_ns=max(one.received_ns, self._taken_ns)) for one in came]
+        self._taken_ns = taken[-1].received_ns if taken else self._taken_ns
+        return taken
 
     def latest(self, name: str, max_age_s: float) -> Said:
-        """The last thing that sensor ``name`` measured; raises `DeviceLostError` where that is older."""
+        """The freshest thing that sensor ``name`` measured; raises `DeviceLostError` where that is older."""
         if name not in self._boxes:
             raise NotFoundError(f"there is no sensor {name!r}", did_you_mean(name, self._boxes))
         last = self._boxes[name].latest
-        age_ns = None if last is None else self._clock.now_ns() - last.received_ns
+        age_ns = None if last is None else self._clock.now_ns() - true_ns(last)
         if last is None or age_ns is None or age_ns > nanoseconds(max_age_s):
             age = "nothing yet" if age_ns is None else f"its last word is {seconds(age_ns):.2f} s old"
             raise DeviceLostError(f"{name}: {age}, asked for at most {max_age_s:g} s", "wait, or look at its state")
@@ -148,7 +167,7 @@ class Supervisor:
             keeper.name,
             State.STALLED if hung else keeper.state,
             box.rate_hz() if keeper.state is State.RUNNING else None,
-            None if last is None else seconds(now_ns - last.received_ns),
+            None if last is None else seconds(now_ns - true_ns(last)),
             box.messages,
             box.dropped,
             keeper.losses,

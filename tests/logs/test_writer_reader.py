@@ -15,6 +15,7 @@ from fusion import (
     Gyro,
     LogError,
     Odometry,
+    PluginError,
     Pose,
     Prior,
     RangeReading,
@@ -73,6 +74,26 @@ def test_estimate_comes_back_with_what_it_does_not_claim(tmp_path):
     run = read_run(tmp_path / "run.mcap")
     assert run.lanes == {"ekf": estimates}
     assert run.warnings == ()
+
+
+@pytest.mark.parametrize(
+    "estimate", [Estimate(SECOND, Pose(0.0, 0.0, math.inf), None), Estimate(-1, Pose(0.0, 0.0, 0.0), None)]
+)
+def test_what_no_message_can_hold_is_the_estimators_fault_and_the_log_goes_on(tmp_path, estimate):
+    with RunWriter(tmp_path / "run.mcap", WORLD, name="test") as log:
+        with pytest.raises(PluginError, match="odd_one: what it said to 'gyro' at 1000000000 ns fits no message"):
+            log.write_update("odd_one", Update(gyro(SECOND), estimate, ()))
+        log.write(gyro(2 * SECOND))
+    run = read_run(tmp_path / "run.mcap")
+    assert (run.measurements, dict(run.lanes), run.warnings) == ((gyro(2 * SECOND),), {}, ())
+
+
+def test_what_is_known_only_at_the_end_is_in_the_metadata(tmp_path):
+    with RunWriter(tmp_path / "run.mcap", WORLD, name="test", metadata={"a": "1", "b": "2"}) as log:
+        log.write(gyro(SECOND))
+        log.note({"b": "3", "c": "4"})
+    about = read_run(tmp_path / "run.mcap").metadata
+    assert (about["a"], about["b"], about["c"], about["name"]) == ("1", "3", "4", "test")
 
 
 def test_measurements_come_in_the_order_they_arrived(tmp_path):

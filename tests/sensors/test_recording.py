@@ -245,6 +245,8 @@ def test_the_command_says_what_is_wrong_in_one_sentence(tmp_path, capsys):
     path.write_text(robot_text())
     assert main(["record", str(path), "-o", str(path)]) == 1
     assert "choose another place" in capsys.readouterr().err
+    assert main(["record", str(path), "-o", str(tmp_path / "out"), "--duration", "nan"]) == 1
+    assert "leave it out" in capsys.readouterr().err
     assert main(["record", str(path), "-o", str(tmp_path / "out"), "--duration", "0.6", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert re.search(r"trolley-\w{8}-0000\.mcap", told["paths"][0])

@@ -10,6 +10,8 @@ from fusion.values import Gyro
 from sensors.keeper import Keeper, Received, State
 from sensors.supervisor import Mailbox, Supervisor
 
+TENTH_NS = 100_000_000
+
 
 class Counter:
     """A driver that says so many messages, then waits until it is let go."""
@@ -106,10 +108,29 @@ def test_the_status_tells_rate_age_and_whether_a_device_holds_its_driver_up():
     keeper = Keeper("g", Counter("g", 0), clock)
     supervisor = Supervisor([keeper], clock)
     keeper.turn(0.1)
-    supervisor._boxes["g"].put([Received(i * 100_000_000, Gyro(0, "g", i, 0.0)) for i in range(5)])
+    supervisor._boxes["g"].put([Received(i * TENTH_NS, Gyro(i * TENTH_NS, "g", i, 0.0)) for i in range(5)])
     clock.sleep(1.0)
     status = supervisor.statuses()[0]
     assert (status.state, status.messages, status.age_s) == (State.RUNNING, 5, 0.6)
     assert status.rate_hz == pytest.approx(10.0)
     clock.sleep(30.0)
     assert supervisor.statuses()[0].state is State.STALLED
+
+
+def test_old_news_that_comes_now_is_old_and_a_clock_that_is_ahead_makes_nothing_fresher():
+    clock = VirtualClock(20 * TENTH_NS)
+    supervisor = Supervisor([Keeper("g", Counter("g", 0), clock)], clock)
+    for stamp_ns, age_s in ((5 * TENTH_NS, 1.5), (90 * TENTH_NS, 0.0), (TENTH_NS, 0.0)):
+        supervisor._boxes["g"].put([Received(20 * TENTH_NS, Gyro(stamp_ns, "g", 1, 0.5))])
+        assert supervisor.statuses()[0].age_s == age_s
+    assert supervisor.latest("g", 0.1).time_ns == 90 * TENTH_NS
+
+
+def test_arrivals_never_run_backwards_from_one_batch_to_the_next():
+    clock = VirtualClock()
+    supervisor = Supervisor([Keeper(name, Counter(name, 0), clock) for name in "ab"], clock)
+    supervisor._boxes["a"].put([Received(7, Gyro(7, "a", 1, 0.0))])
+    supervisor._news.set()
+    assert [one.received_ns for one in supervisor.take(0.0)] == [7]
+    supervisor._boxes["b"].put([Received(5, Gyro(5, "b", 1, 0.0)), Received(9, Gyro(9, "b", 2, 0.0))])
+    assert [(one.received_ns, one.said.seq) for one in supervisor.take(0.0)] == [(7, 1), (9, 2)]

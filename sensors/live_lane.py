@@ -1,0 +1,68 @@
+"""One estimator among those that run live: whatever it does wrong costs its own lane and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from fusion import Covariance, Estimate, Estimator, FusionError, Measurement, Pose, Prior, Tracker, Update, World
+from fusion.certificate import Certificate
+
+Answer = TypeVar("Answer")
+
+
+class Lane:
+    """An estimator and what it has said so far. ``error`` is why it ended, "" while it goes on."""
+
+    def __init__(self, name: str, estimator: Estimator[Any], world: World, prior: Prior, seed: int) -> None:
+        self.name = name
+        self.error = ""
+        self._certificate = Certificate()
+        self._tracker = self._guarded(lambda: Tracker(estimator, world, prior, seed=seed))
+
+    def hear(self, measurement: Measurement) -> list[Update]:
+        """What it says to one measurement, its own update first; nothing once it ended."""
+        return self._guarded(lambda: self._certified(measurement)) or []
+
+    def estimate(self, time_ns: int) -> Estimate | None:
+        """Its belief at ``time_ns``; None once it ended."""
+        return self._guarded(lambda: _plain(self._tracker.estimate(time_ns)) if self._tracker else None)
+
+    def end(self, error: str) -> None:
+        """Let it say no more, for a reason."""
+        self.error = self.error or error
+
+    @property
+    def digest(self) -> str:
+        """The certificate of all it said, as `fusion.digest`; "" once it ended."""
+        return "" if self.error else self._certificate.digest
+
+    def _certified(self, measurement: Measurement) -> list[Update]:
+        updates = self._tracker.push(measurement) if self._tracker else []
+        for update in updates:
+            self._certificate.add(update)
+        return updates
+
+    def _guarded(self, act: Callable[[], Answer]) -> Answer | None:
+        if self.error:
+            return None
+        try:
+            return act()
+        except FusionError as known:
+            self.error = str(known)
+        except Exception as unknown:  # noqa: BLE001 - a plug-in may fail in any way, and the others go on
+            self.error = f"{self.name} failed: {unknown!r}; choose another estimator, or report it to its author"
+        return None
+
+
+def _plain(estimate: Estimate) -> Estimate:
+    """The same in plain numbers, whatever arrays it was made with; raises where something in it is no number."""
+    claim, lost = estimate.covariance, estimate.p_lost
+    return estimate._replace(
+        time_ns=int(estimate.time_ns),
+        pose=Pose(*map(float, estimate.pose)),
+        covariance=None if claim is None else Covariance(*map(float, claim)),
+        valid=bool(estimate.valid),
+        heading_known=bool(estimate.heading_known),
+        p_lost=None if lost is None else float(lost),
+    )
