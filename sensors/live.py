@@ -132,7 +132,7 @@ def _run(
     with sensing:
         if patience_s is not None:
             sensing.await_open(patience_s, stop)
-        prior = robot.start.prior(sensing.clock.now_ns(), robot.world)
+        prior = robot.start.prior(sensing.began_ns, robot.world)
         lanes = [Lane(one.name, one.estimator, robot.world, prior, one.seed) for one in contestants]
         about = {"live_lanes": json.dumps({one.name: one.record for one in contestants})}
         with Recorder(robot, folder, prior, about) if folder else nullcontext() as recorder:

@@ -56,15 +56,14 @@ def record(
     with sensing:
         if not degraded:
             sensing.await_open(patience_s, stop)
-        began_ns = sensing.clock.now_ns()
-        with Recorder(robot, folder, robot.start.prior(began_ns, robot.world)) as recorder:
+        with Recorder(robot, folder, robot.start.prior(sensing.began_ns, robot.world)) as recorder:
             for turn in sensing.turns(stop, duration_s):
                 recorder.take(turn)
                 if turn.report is not None:
                     tell(turn.report.statuses)
                 if recorder.trouble:
                     sensing.end(recorder.trouble)
-    duration_s = seconds(sensing.clock.now_ns() - began_ns)
+    duration_s = seconds(sensing.clock.now_ns() - sensing.began_ns)
     return Recorded(recorder.paths, tuple(sensing.statuses()), duration_s, sensing.trouble)
 
 

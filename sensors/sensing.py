@@ -54,6 +54,9 @@ class Sensing:
         """Build every driver and open no device; raises `DriverError` or `PluginError`."""
         self.trouble = ""
         self.clock = BootClock()
+        self.began_ns = self.clock.now_ns()
+        """Before anything can be measured: the time of the prior, since the first command to the motors must not be
+        older than it."""
         self._fail_fast = fail_fast
         self._keepers = [
             Keeper(sensor.name, build_driver(sensor, self.clock), self.clock, fail_fast=fail_fast, seed=number)
