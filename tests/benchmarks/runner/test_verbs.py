@@ -165,6 +165,35 @@ def test_gate_answers_with_the_exit_code_of_its_gravest_finding(place, tmp_path,
     assert "not measured: 0 of 16 cells are there" in capsys.readouterr().out
 
 
+def test_gate_for_a_metric_that_no_cell_has_never_passes(place, results, tmp_path, capsys):
+    """A misspelt metric is infinite in every cell, now and before: that used to be "what it was"."""
+    misspelt = tmp_path / "suite.toml"
+    misspelt.write_text((HEAD + RUNS + TAIL).replace("pos_p75 =", "pos_p755 ="))
+    assert main(words(place, "export", "--json", str(tmp_path / "base.json"))) == 0
+    asked = ["bench", "gate", str(misspelt), "--store", str(place / "store"), "--baseline", str(tmp_path / "base.json")]
+    assert main(asked) == Outcome.USAGE
+    assert "no metric 'pos_p755'; did you mean 'pos_p75'?" in capsys.readouterr().out
+
+
+def test_file_that_is_no_baseline_is_told_in_a_line(place, tmp_path, capsys):
+    (tmp_path / "log.mcap").write_bytes(b"\x89MCAP0\r\n" * 1000)
+    assert main(words(place, "gate", "--baseline", str(tmp_path / "log.mcap"))) == Outcome.USAGE
+    assert len(capsys.readouterr().out) < 300
+
+
+@pytest.mark.parametrize("more", [["gate", "--verify", "-3"], ["verify", "--sample", "0"]])
+def test_no_cell_at_all_is_no_sample(place, more, capsys):
+    with pytest.raises(SystemExit) as refusal:
+        main(words(place, *more))
+    assert refusal.value.code == Outcome.USAGE
+    assert "give a whole number from 1 on" in capsys.readouterr().err
+
+
+def test_export_of_nothing_is_refused(place, capsys):
+    assert main(words(place, "export")) == 1
+    assert "give at least one of --json, --csv" in capsys.readouterr().err
+
+
 def test_baseline_of_other_metrics_is_refused(place, tmp_path, capsys):
     path = tmp_path / "old.json"
     path.write_text('{"results": [], "metrics_version": 0}')
