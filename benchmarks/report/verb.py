@@ -19,6 +19,7 @@ from benchmarks.plotting import as_png, require_matplotlib
 from benchmarks.report import tables
 from benchmarks.report.cells import SCRIPT, counted, entries
 from benchmarks.report.figures import FIGURES
+from benchmarks.report.innovations import innovations
 from benchmarks.report.material import Material
 from benchmarks.report.pairs import deciding, pairs, run_by_run
 from benchmarks.report.sensitivity import advice, curves, sensitivity, sweeps
@@ -122,6 +123,9 @@ def _sheets(material: Material, *, limit: bool) -> Iterator[Sheet]:
     if material.comparison is not None:
         yield pairs(material, material.comparison)
         yield run_by_run(material)
+    predicted = innovations(material)
+    if predicted.rows:
+        yield predicted
     if limit and material.scored_runs:
         yield tables.limits(material)
         yield tables.fixes(material)
