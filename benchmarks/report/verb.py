@@ -24,9 +24,9 @@ from benchmarks.report.material import Material
 from benchmarks.report.pairs import deciding, pairs, run_by_run
 from benchmarks.report.sensitivity import advice, curves, sensitivity, sweeps
 from benchmarks.runner.compare_verb import stored_results
-from benchmarks.runner.definition import TUNE
+from benchmarks.runner.definition import CLEAN, TUNE
 from benchmarks.runner.plan_verb import suite_options
-from benchmarks.runner.results import RANKED_BY, require_metric
+from benchmarks.runner.results import RANKED_BY, record, require_metric
 from benchmarks.runner.store import Store
 from benchmarks.sheet import Sheet, as_markdown
 from benchmarks.statistics.within_run import LEAST_INSTANTS, within_run
@@ -88,9 +88,13 @@ def _about_runs(material: Material) -> Iterator[str]:
 
 
 def as_page(material: Material, *, limit: bool = False) -> bytes:
-    """The report as one HTML file; raises `FusionError` without matplotlib or markdown-it."""
+    """The report as one HTML file, with the numbers that make it a baseline for `fusion bench gate`; raises
+    `FusionError` without matplotlib or markdown-it.
+    """
     require_matplotlib()
-    return as_html(material.suite.name, report(material, limit=limit), SCRIPT)
+    clean = [result for result in material.results if result.cell.fault.id == CLEAN]
+    page = report(material, limit=limit)
+    return as_html(material.suite.name, page, SCRIPT, record(material.suite, clean))
 
 
 def _verdicts(material: Material) -> Iterator[str]:

@@ -18,6 +18,7 @@ import numpy as np
 from benchmarks.arguments import at_least_one
 from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.metrics.track import Floats
+from benchmarks.page import data_of
 from benchmarks.runner.definition import CLEAN, Gate, load_suite
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.plan_verb import suite_options
@@ -125,9 +126,10 @@ def _ratio(name: str, metric: str, margin: float, now: Floats, before: Floats) -
 
 
 def read_baseline(path: Path) -> Baseline:
-    """What `fusion bench export --json` has written, by contestant; raises `SuiteError`."""
+    """What `fusion bench export --json`, or `report --html`, has written, by contestant; raises `SuiteError`."""
     try:
-        stored = json.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        stored = data_of(text) if path.suffix == ".html" else json.loads(text)
         rows, version = stored["results"], stored["metrics_version"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise SuiteError(f"{path}: no baseline ({error}); write one with `fusion bench export --json`") from error
@@ -143,7 +145,12 @@ def read_baseline(path: Path) -> Baseline:
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion bench gate``."""
     suite_options(parser)
-    parser.add_argument("--baseline", type=Path, metavar="F", help="in place of the one the suite names")
+    parser.add_argument(
+        "--baseline",
+        type=Path,
+        metavar="F",
+        help="in place of the suite's: JSON of export, or HTML of report",
+    )
     parser.add_argument("--verify", type=at_least_one, default=0, metavar="N", help="compute N cells again and compare")
 
 
