@@ -66,7 +66,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     suite_options(parser)
     parser.add_argument("-j", "--workers", type=at_least_one, metavar="N", help="processes; one per core by default")
     parser.add_argument("--shard", type=_shard, metavar="I/N", help="only the I-th of N parts, by key")
-    parser.add_argument("--dask", metavar="ADDRESS", help="carry the cells out on this Dask scheduler")
+    parser.add_argument("--dask", metavar="ADDRESS", help="carry the cells out on this Dask scheduler; its limits hold")
 
 
 def _shard(text: str) -> tuple[int, int]:
