@@ -130,15 +130,21 @@ def read_baseline(path: Path) -> Baseline:
     try:
         text = path.read_text(encoding="utf-8")
         stored = data_of(text) if path.suffix == ".html" else json.loads(text)
-        rows, version = stored["results"], stored["metrics_version"]
+        version, grouped = stored["metrics_version"], _by_estimator(stored["results"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise SuiteError(f"{path}: no baseline ({error}); write one with `fusion bench export --json`") from error
     if version != METRICS_VERSION:
         raise SuiteError(f"{path}: of metrics {version}, these are {METRICS_VERSION}; write the baseline anew")
+    return grouped
+
+
+def _by_estimator(rows: Sequence[Mapping[str, Any]]) -> Baseline:
+    """The rows without faults; raises what rows raise that are none."""
     grouped: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
-        if row["fault"] == CLEAN:
-            grouped.setdefault(row["estimator"], []).append(row)
+        estimator, fault, *_ = (row[key] for key in ("estimator", "fault", "run", "seed", "status"))
+        if fault == CLEAN:
+            grouped.setdefault(estimator, []).append(row)
     return grouped
 
 

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.runner.compare_verb import stored_results
 from benchmarks.runner.definition import Contestant, FaultSet, Gate, RunSource, load_suite
 from benchmarks.runner.export_verb import as_junit, as_latex
@@ -175,10 +176,21 @@ def test_gate_for_a_metric_that_no_cell_has_never_passes(place, results, tmp_pat
     assert "no metric 'pos_p755'; did you mean 'pos_p75'?" in capsys.readouterr().out
 
 
-def test_file_that_is_no_baseline_is_told_in_a_line(place, tmp_path, capsys):
-    (tmp_path / "log.mcap").write_bytes(b"\x89MCAP0\r\n" * 1000)
-    assert main(words(place, "gate", "--baseline", str(tmp_path / "log.mcap"))) == Outcome.USAGE
-    assert len(capsys.readouterr().out) < 300
+@pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param(b"\x89MCAP0\r\n" * 1000, id="a log"),
+        pytest.param(b"[1]", id="a list"),
+        pytest.param(json.dumps({"metrics_version": METRICS_VERSION, "results": [{}]}).encode(), id="a row of nothing"),
+        pytest.param(json.dumps({"metrics_version": METRICS_VERSION, "results": 3}).encode(), id="no rows"),
+    ],
+)
+def test_file_that_is_no_baseline_is_told_in_a_line(place, tmp_path, content, capsys):
+    (tmp_path / "base").write_bytes(content)
+    assert main(words(place, "gate", "--baseline", str(tmp_path / "base"))) == Outcome.USAGE
+    said = capsys.readouterr().out
+    assert "no baseline (" in said
+    assert len(said) < 300
 
 
 @pytest.mark.parametrize("more", [["gate", "--verify", "-3"], ["verify", "--sample", "0"]])
