@@ -13,6 +13,13 @@ def at_least_one(text: str) -> int:
     return int(text)
 
 
+def not_negative(text: str) -> int:
+    """A seed, from a command line."""
+    if not text.removeprefix("+").isdigit():
+        raise argparse.ArgumentTypeError(f"{text} is no seed; give a whole number from 0 on")
+    return int(text)
+
+
 def since_start(text: str) -> float:
     """A time [s] after a run's start, from a command line."""
     try:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import fusion
-from benchmarks.arguments import at_least_one
+from benchmarks.arguments import at_least_one, not_negative
 from benchmarks.cell import STATUSES, Cell, Score, cached_run, crashed, score_cell
 from benchmarks.metrics.score import pool
 from benchmarks.output import write_json
@@ -116,13 +116,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], metavar="NAME.KEY=VALUE", help="a parameter of an estimator; repeatable"
     )
     parser.add_argument("--json", type=Path, metavar="OUT", help="write one record per run and estimator; - for stdout")
-    parser.add_argument("--seed", type=int, default=0, help="of the estimators that draw random numbers")
+    parser.add_argument("--seed", type=not_negative, default=0, help="of the estimators that draw random numbers")
     parser.add_argument("--workers", type=at_least_one, metavar="N", help="processes; one per core by default")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Bench, print the tables, write the records. Exit code 1 when no estimator survived."""
-    chosen = arguments.estimators.split(",") if arguments.estimators else None
+    chosen = None if arguments.estimators is None else arguments.estimators.split(",")
     with progress_bar("bench") as progress:
         scores = bench(
             arguments.runs,

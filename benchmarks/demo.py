@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+from benchmarks.arguments import not_negative
 from benchmarks.bench import bench, pooled, remarks, write_records
 from benchmarks.cell import Score
 from benchmarks.output import write
@@ -99,7 +100,7 @@ def _tell(progress: str) -> None:
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion demo``."""
     parser.add_argument("-o", "--output", type=Path, default=Path("fusion-demo"), metavar="FOLDER", help="%(default)s")
-    parser.add_argument("--seed", type=int, default=0, help="another seed, another run")
+    parser.add_argument("--seed", type=not_negative, default=0, help="another seed, another run")
     parser.add_argument("--no-view", action="store_true", help="do not open the viewer")
 
 

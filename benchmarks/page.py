@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 import html
+import json
+from typing import Any
 
 from fusion import FusionError
 
@@ -26,9 +28,13 @@ a { color: light-dark(#0072b2, #56b4e9); }
 """
 
 
-def as_html(title: str, markdown: str, script: str = "") -> bytes:
+DATA, END = '<script type="application/json" id="data">', "</script>"
+"""What stands around the numbers of a page; inside, `<` is escaped."""
+
+
+def as_html(title: str, markdown: str, script: str = "", data: object = None) -> bytes:
     """The page, readable on a phone; pictures in it should be linked to by `inline_png`, and it must make sense without
-    its ``script``. Raises `FusionError`.
+    its ``script``. ``data``: numbers for programs, which `data_of` reads again. Raises `FusionError`.
     """
     try:
         from markdown_it import MarkdownIt
@@ -38,7 +44,20 @@ def as_html(title: str, markdown: str, script: str = "") -> bytes:
     viewport = '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
     run = f"<script>{script}</script>" if script else ""
     head = f"<head>{viewport}<title>{html.escape(title)}</title><style>{STYLE}</style></head>"
-    return f'<!doctype html><html lang="en">{head}<body>{body}{run}</body></html>\n'.encode()
+    numbers = "" if data is None else DATA + json.dumps(data, allow_nan=False).replace("<", r"\u003c") + END
+    return f'<!doctype html><html lang="en">{head}<body>{body}{numbers}{run}</body></html>\n'.encode()
+
+
+def data_of(page: str) -> Any:  # noqa: ANN401 - whatever was written
+    """The ``data`` of a page; raises `ValueError` when it holds none.
+
+    >>> data_of(as_html("t", "text", data={"a": [1.5, "</script>"]}).decode())
+    {'a': [1.5, '</script>']}
+    """
+    _, found, rest = page.partition(DATA)
+    if not found:
+        raise ValueError("the page holds no numbers")
+    return json.loads(rest.partition(END)[0])
 
 
 def figure(what: str, picture: bytes) -> str:

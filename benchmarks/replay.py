@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import fusion
+from benchmarks.arguments import not_negative
 from benchmarks.lane import Lane, run_lane
 from benchmarks.metrics.track import Track
 from fusion import LogError, ParameterError, PluginError, Truth
@@ -102,7 +103,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("run", type=Path, metavar="RUN", help="an MCAP log")
     parser.add_argument("--estimator", required=True, metavar="NAME", help="`fusion estimators` lists them")
     parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="the log to write")
-    parser.add_argument("--seed", type=int, default=0, help="of an estimator that draws random numbers")
+    parser.add_argument("--seed", type=not_negative, default=0, help="of an estimator that draws random numbers")
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="a parameter of the estimator; repeatable"
     )

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.arguments import at_least_one
+from benchmarks.arguments import at_least_one, not_negative
 from benchmarks.output import require_place, write_json
 from benchmarks.paper.calibrated import write_calibrated
 from benchmarks.paper.experiment import run_experiments
@@ -45,7 +45,9 @@ def reproduce(
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion reproduce``."""
     parser.add_argument("--trials", type=at_least_one, default=TRIALS, metavar="N", help="runs each (%(default)s)")
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the first run; the next counts one up")
+    parser.add_argument(
+        "--seed", type=not_negative, default=0, metavar="S", help="of the first run; the next counts one up"
+    )
     parser.add_argument("--json", type=Path, metavar="F", help="every number, in metres")
     parser.add_argument("--html", type=Path, metavar="F", help="the whole page in one file, figures in it")
     parser.add_argument("--png", type=Path, metavar="F", help="the paper's result figures")

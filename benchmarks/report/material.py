@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.metrics.archive import from_bytes
 from benchmarks.metrics.bound import Places, Radio, fix_error
 from benchmarks.metrics.deviation import Errors, errors
+from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.instants import Answers, Instants, evaluation_instants, match
 from benchmarks.metrics.track import Floats
 from benchmarks.runner.definition import CLEAN, Suite
+from benchmarks.runner.execute import stored_track
 from benchmarks.runner.plan_verb import STORE
 from benchmarks.runner.results import RANKED_BY, Result, by_contestant, comparison, judged, median_metrics
 from benchmarks.runner.source import open_run
@@ -35,6 +36,7 @@ class Series(NamedTuple):
     result: Result
     instants: Instants
     answers: Answers
+    fates: FateColumns
 
     @property
     def time_s(self) -> Floats:
@@ -158,8 +160,8 @@ class Material:
         truth = self.run(cell.run.id).truth
         assert truth is not None
         instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
-        track, _ = from_bytes(self._store.read("estimates", cell.estimate_key, "track.npz"))
-        return Series(result, instants, match(instants, track, max_age_s=rules.max_age_s))
+        track, fates = stored_track(cell, self._store)
+        return Series(result, instants, match(instants, track, max_age_s=rules.max_age_s), fates)
 
 
 def _ids(result: Result) -> tuple[str, str, str, int]:

@@ -19,13 +19,14 @@ from benchmarks.plotting import as_png, require_matplotlib
 from benchmarks.report import tables
 from benchmarks.report.cells import SCRIPT, counted, entries
 from benchmarks.report.figures import FIGURES
+from benchmarks.report.innovations import innovations
 from benchmarks.report.material import Material
 from benchmarks.report.pairs import deciding, pairs, run_by_run
 from benchmarks.report.sensitivity import advice, curves, sensitivity, sweeps
 from benchmarks.runner.compare_verb import stored_results
-from benchmarks.runner.definition import TUNE
+from benchmarks.runner.definition import CLEAN, TUNE
 from benchmarks.runner.plan_verb import suite_options
-from benchmarks.runner.results import RANKED_BY
+from benchmarks.runner.results import RANKED_BY, record, require_metric
 from benchmarks.runner.store import Store
 from benchmarks.sheet import Sheet, as_markdown
 from benchmarks.statistics.within_run import LEAST_INSTANTS, within_run
@@ -87,9 +88,13 @@ def _about_runs(material: Material) -> Iterator[str]:
 
 
 def as_page(material: Material, *, limit: bool = False) -> bytes:
-    """The report as one HTML file; raises `FusionError` without matplotlib or markdown-it."""
+    """The report as one HTML file, with the numbers that make it a baseline for `fusion bench gate`; raises
+    `FusionError` without matplotlib or markdown-it.
+    """
     require_matplotlib()
-    return as_html(material.suite.name, report(material, limit=limit), SCRIPT)
+    clean = [result for result in material.results if result.cell.fault.id == CLEAN]
+    page = report(material, limit=limit)
+    return as_html(material.suite.name, page, SCRIPT, record(material.suite, clean))
 
 
 def _verdicts(material: Material) -> Iterator[str]:
@@ -122,6 +127,9 @@ def _sheets(material: Material, *, limit: bool) -> Iterator[Sheet]:
     if material.comparison is not None:
         yield pairs(material, material.comparison)
         yield run_by_run(material)
+    predicted = innovations(material)
+    if predicted.rows:
+        yield predicted
     if limit and material.scored_runs:
         yield tables.limits(material)
         yield tables.fixes(material)
@@ -168,6 +176,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the page."""
     require_matplotlib()
     suite, results = stored_results(arguments)
+    require_metric(arguments.metric, results)
     material = Material(suite, results, Store(arguments.store), arguments.metric)
     targets = {}
     if arguments.markdown:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.colours import ANCHOR, TRUTH, WALL, anchor_colour
-from benchmarks.review.canvas import Canvas
+from benchmarks.metrics.track import Floats, Stamps
+from benchmarks.review.canvas import Canvas, thinned
 from benchmarks.review.cdf import CdfAxes, draw_axes
 from benchmarks.review.frame import Frame
 from benchmarks.review.heard import Heard
@@ -15,6 +16,9 @@ from benchmarks.review.paths import draw_path
 from benchmarks.review.raw_sensors import draw_raw_sensors, raw_series
 from fusion import World
 from logs.run import Run, TruthTrack
+
+ARROW_M = 0.75
+"""Length of the arrow that shows the true heading."""
 
 
 def draw_base(canvas: Canvas, run: Run, readings: Heard, axes: CdfAxes | None, legend: tuple[float, float]) -> None:
@@ -59,6 +63,19 @@ def _draw_truth(canvas: Canvas, truth: TruthTrack) -> None:
     known = np.flatnonzero(np.isfinite(truth.x) & np.isfinite(truth.y))
     xy = np.column_stack([truth.x, truth.y])[known]
     draw_path(canvas, ["map", "truth"], TRUTH, truth.time_ns[known], xy)
+    turned = known[np.isfinite(truth.heading[known])]
+    _draw_heading(canvas, truth.time_ns[turned], truth.x[turned], truth.y[turned], truth.heading[turned])
+
+
+def _draw_heading(canvas: Canvas, time_ns: Stamps, x: Floats, y: Floats, heading: Floats) -> None:
+    """Where the robot looks: an arrow from its true place at the time cursor."""
+    if len(time_ns) == 0:
+        return
+    origins, angle = thinned(np.column_stack([x, y])), thinned(heading)
+    vectors = ARROW_M * np.column_stack([np.cos(angle), np.sin(angle)])
+    rr, place = canvas.rr, ["map", "truth", "heading"]
+    canvas.style(place, rr.Arrows2D.from_fields(colors=[TRUTH], radii=[-1.5]))
+    canvas.columns(place, thinned(time_ns), rr.Arrows2D.columns(vectors=vectors, origins=origins))
 
 
 def _draw_readings(canvas: Canvas, world: World, readings: Heard) -> None:

@@ -44,7 +44,7 @@ def _overview(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa:
     import rerun.blueprint as rrb
 
     has_truth = run.truth is not None
-    scores = rrb.Horizontal(score_view(), cdf_view(drawn), column_shares=[3, 2]) if has_truth else score_view()
+    scores = rrb.Horizontal(score_view(), cdf_view(drawn), column_shares=[7, 3]) if has_truth else score_view()
     left = rrb.Vertical(map_view(frame, run, drawn), scores, row_shares=[2, 1])
     # More names than that hide the plot; the map's own legend stands beside it.
     titles = {"Position error (m)": "/error", "Heading error (°)": "/heading_error"}

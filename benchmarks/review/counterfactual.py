@@ -59,14 +59,20 @@ def without_radio_at(run: Run, at_s: float) -> Counterfactual:
     radio = [(m.time_ns, i) for i, m in enumerate(run.measurements) if isinstance(m, WifiScan | Ranges)]
     if not radio:
         raise ParameterError(f"--reject {at_s:g}: {run.path} holds no radio measurement that could be taken out")
-    if not 0.0 <= at_s <= frame.duration_s:
-        raise ParameterError(
-            f"--reject {at_s:g}: {run.path} lasts from 0 to {frame.duration_s:.2f} s; give a time in between"
-        )
+    require_within(run, at_s, "--reject")
     wanted_ns = frame.start_ns + nanoseconds(at_s)
     time_ns, place = min(radio, key=lambda entry: (abs(entry[0] - wanted_ns), entry))
     kept = run.measurements[:place] + run.measurements[place + 1 :]
     return Counterfactual(f"reject {seconds(time_ns - frame.start_ns):.2f} s", replace(run, measurements=kept))
+
+
+def require_within(run: Run, at_s: float, option: str) -> None:
+    """Raises `ParameterError`, which names the option, for a time that is none of the run's."""
+    duration_s = Frame.around(run).duration_s
+    if not 0.0 <= at_s <= duration_s:
+        raise ParameterError(
+            f"{option} {at_s:g}: {run.path} lasts from 0 to {duration_s:.2f} s; give a time in between"
+        )
 
 
 def ghost_lane(estimator: str, params: Mapping[str, object], counterfactual: Counterfactual, seed: int) -> Lane:

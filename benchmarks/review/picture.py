@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from benchmarks.output import require_place
 from benchmarks.review.viewer import PAUSE_S, go_to, require_rerun, start
 from fusion import ViewerError
 
@@ -24,17 +25,14 @@ NO_DRIVER = (
 
 def render(files: Sequence[Path], output: Path, *, at_s: float | None = None) -> Path:
     """Draw Rerun files that belong together into the PNG file ``output``, the time cursor ``at_s`` after the start
-    (None: at the end). Raises `ViewerError` when there is no viewer, no driver, or a view that reports an error.
+    (None: at the end). Raises `ViewerError` when there is no viewer, no driver, or a view that reports an error, and
+    `FusionError` for a place that cannot be written to.
     """
     require_rerun()
     for file in files:
         if not file.is_file():
             raise ViewerError(f"{file}: no such file; write one with `fusion review RUN.mcap --save {file}`")
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        output.touch()
-    except OSError as error:
-        raise ViewerError(f"{output}: the picture cannot be written ({error.strerror}); give another place") from error
+    require_place(output)
     with headless_viewer(files) as client:
         go_to(client, at_s)
         _take_settled(client, output)

@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import fusion
-from benchmarks.arguments import at_least_one, since_start
+from benchmarks.arguments import at_least_one, not_negative, since_start
 from benchmarks.bench import Settings, check, parse_settings
 from benchmarks.cell import Cell, Score, cached_run, score_lane
 from benchmarks.clouds import CloudWatch
 from benchmarks.lane import Lane, run_lane
-from benchmarks.review.counterfactual import Counterfactual, counterfactuals, ghost_lane
+from benchmarks.output import require_place
+from benchmarks.review.counterfactual import Counterfactual, counterfactuals, ghost_lane, require_within
 from benchmarks.review.drawing import drawings
 from benchmarks.review.frame import Frame
 from benchmarks.review.invocation import review_command
@@ -63,19 +64,24 @@ def review(
     ``worst``: how many of the worst moments of each estimator are looked for. ``without`` an anchor, ``reject_s`` the
     radio measurement nearest to a time: each adds what every estimator would have made of that, as a ghost.
 
-    Raises `LogError`, `PluginError`, `ParameterError`, or `ViewerError` when there is nothing to draw with or on.
+    Raises `LogError`, `PluginError`, `ParameterError`, `ViewerError` when there is nothing to draw with or on, or
+    `FusionError` for a picture that has no place.
     """
     opens = save is None and png is None and not worst
     if opens and not has_display():
         raise ViewerError(NO_DISPLAY)
     if opens or save is not None or png is not None:
         require_rerun()
+    if png is not None:
+        require_place(png)
     names = tuple(dict.fromkeys(fusion.names() if estimators is None else estimators))
     settings = settings or {}
     check([run], names, settings)
     recorded = cached_run(run)
     if worst and recorded.truth is None:
         raise ParameterError(f"--worst: {run} holds no ground truth, so no moment is worse than another; leave it out")
+    if at_s is not None:
+        require_within(recorded, at_s, "--at")
     chosen = {name: settings.get(name, {}) for name in names}
     lanes, scores = _folded(recorded, chosen, counterfactuals(recorded, without, reject_s), seed)
     files: list[Path] = []
@@ -141,7 +147,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="what if the radio measurement nearest to that time had been refused; repeatable",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the estimators that draw random numbers")
+    parser.add_argument("--seed", type=not_negative, default=0, help="of the estimators that draw random numbers")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -153,7 +159,7 @@ def run(arguments: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory(prefix=PREFIX) as folder:
         made = review(
             arguments.run,
-            estimators=arguments.estimators.split(",") if arguments.estimators else None,
+            estimators=None if arguments.estimators is None else arguments.estimators.split(","),
             settings=settings,
             save=arguments.save or (Path(folder, SCENE) if arguments.web else None),
             png=arguments.png,

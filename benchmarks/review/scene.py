@@ -24,10 +24,12 @@ from benchmarks.review.estimator_plots import draw_over_time
 from benchmarks.review.frame import Frame
 from benchmarks.review.heard import heard
 from benchmarks.review.viewer import require_rerun
-from benchmarks.table import COLUMNS, as_text, ranked
+from benchmarks.table import COLUMNS, Column, as_text, ranked
 from fusion import FusionError
 from logs.run import Run
 
+AGES = (Column("age_p95", "age", 1.0, 2), Column("dropouts", "gaps", 1.0, 0))
+"""How old the newest answer was at 95 % of the instants [s], and how often there was none for a while."""
 APPLICATION = "fusion"
 SUFFIX = ".rrd"
 
@@ -94,12 +96,13 @@ def _axes(drawn: Sequence[Drawing]) -> CdfAxes | None:
 
 def markdown(scores: Sequence[Score]) -> str:
     """The score table, the best first, and why an estimator is missing from it; the view's name tells the units."""
-    titles = ["estimator", *(column.title.partition("\n")[0] for column in COLUMNS)]
+    columns = (*COLUMNS, *AGES)
+    titles = ["estimator", *(column.title.partition("\n")[0] for column in columns)]
     lines = ["| " + " | ".join(titles) + " |", "|---" * len(titles) + "|"]
     for score in ranked(scores):
         values = {**score.facts, **score.metrics}
         remark = "" if score.status in ("ok", "unscored") else f" ({score.status})"
-        cells = [score.estimator + remark, *(as_text(column, values) for column in COLUMNS)]
+        cells = [score.estimator + remark, *(as_text(column, values) for column in columns)]
         lines.append("| " + " | ".join(cells) + " |")
     crashes = [f"\n{score.estimator} crashed: {score.error}" for score in scores if score.error is not None]
     return "\n".join([*lines, *crashes]) + "\n"

@@ -71,7 +71,7 @@ def score_view() -> Any:  # noqa: ANN401
     """The score table."""
     import rerun.blueprint as rrb
 
-    return rrb.TextDocumentView(name="Scores, the best first (cm, °, %, µs a message)", origin="/scores")
+    return rrb.TextDocumentView(name="Scores, the best first (cm, °, %, µs a message, s)", origin="/scores")
 
 
 def cdf_view(drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401

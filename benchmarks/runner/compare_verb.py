@@ -10,7 +10,7 @@ from typing import NoReturn
 from benchmarks.runner.definition import CLEAN, Suite, load_suite
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.plan_verb import suite_options
-from benchmarks.runner.results import RANKED_BY, Result, comparison, read_results
+from benchmarks.runner.results import RANKED_BY, Result, comparison, read_results, require_metric
 from benchmarks.runner.store import Store
 from benchmarks.sheet import Sheet, print_sheets
 from benchmarks.statistics.verdict import Comparison, Verdict
@@ -83,12 +83,11 @@ def run(arguments: argparse.Namespace) -> int:
 def _require(arguments: argparse.Namespace, results: Sequence[Result]) -> None:
     ids = {result.cell.contestant.id for result in results}
     faults = {result.cell.fault.id for result in results}
-    metrics = {name for result in results for name in result.metrics}
     for what, asked, known in (
         ("estimator", arguments.estimators, ids),
         ("fault", [arguments.fault], faults),
-        ("metric", [arguments.metric], metrics),
     ):
         for one in asked:
             if one not in known:
                 raise ParameterError(f"the suite has no {what} {one!r}; {did_you_mean(one, sorted(known))}")
+    require_metric(arguments.metric, results)

@@ -22,6 +22,10 @@ CLEAN = "clean"
 """The fault that is none; every suite has it."""
 TUNE, TEST = "tune", "test"
 """What a run is for: parameters are chosen on the first kind and judged on the second."""
+READINGS = ("causal", "interp")
+"""How truth and estimate are brought together."""
+INCONCLUSIVE = ("fail", "warn")
+"""What a gate makes of "cannot tell"."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +190,7 @@ def load_suite(path: Path) -> Suite:
 
 def _checked(written: _File, path: Path) -> Suite:
     head = written.suite
+    _check_grids(written, path)
     contestants = tuple(each for estimator in written.estimators for each in estimator.combinations())
     faults = (FaultSet(CLEAN), *written.faults)
     for what, items in (("runs", written.runs), ("estimators", contestants), ("faults", faults)):
@@ -194,6 +199,7 @@ def _checked(written: _File, path: Path) -> Suite:
         _check_run(run, f"{path}: runs[{number}] ({run.id})")
     _check_head(head, f"{path}: suite")
     _check_tuning(written, path)
+    _require_one_of(written.gate.inconclusive, INCONCLUSIVE, f"{path}: gate.inconclusive")
     runs = tuple(replace(run, topics={**head.topics, **run.topics}) for run in written.runs)
     return Suite(
         head.name,
@@ -222,17 +228,37 @@ def _check_run(run: RunSource, where: str) -> None:
         raise SuiteError(f"{where}: give either mcap, a log, or scenario, a simulated run")
     if run.topics and run.world is None:
         raise SuiteError(f"{where}: topics are of a foreign bag, which needs a world too; our own logs need neither")
-    if run.split not in (TUNE, TEST):
-        raise SuiteError(f"{where}: split is {run.split!r}; {did_you_mean(run.split, (TUNE, TEST))}")
+    if run.duration_s is not None:
+        _require_above_zero(where, duration_s=run.duration_s)
+    _require_one_of(run.split, (TUNE, TEST), f"{where}.split")
 
 
 def _check_head(head: _Head, where: str) -> None:
     if head.seeds < 1 or head.seed < 0:
         raise SuiteError(f"{where}: {head.seeds} seeds from seed {head.seed}; give 1 or more, from a seed not below 0")
-    if head.eval.reading not in ("causal", "interp"):
-        raise SuiteError(
-            f"{where}.eval.reading: {head.eval.reading!r}; {did_you_mean(head.eval.reading, ('causal', 'interp'))}"
-        )
+    rules, limits = head.eval, head.limits
+    _require_one_of(rules.reading, READINGS, f"{where}.eval.reading")
+    _require_above_zero(f"{where}.eval", hz=rules.hz, max_age_s=rules.max_age_s, gap_s=rules.gap_s)
+    _require_above_zero(f"{where}.limits", wall_s=limits.wall_s, rss_mb=limits.rss_mb)
+
+
+def _require_above_zero(where: str, **numbers: float) -> None:
+    for name, number in numbers.items():
+        if not number > 0.0:
+            raise SuiteError(f"{where}.{name}: {number:g} is not above 0; give a greater number")
+
+
+def _require_one_of(word: str, known: Sequence[str], where: str) -> None:
+    if word not in known:
+        raise SuiteError(f"{where}: {word!r} does not exist; {did_you_mean(word, known)}")
+
+
+def _check_grids(written: _File, path: Path) -> None:
+    """A grid without a value would make no contestant at all."""
+    for estimator in written.estimators:
+        for name, values in estimator.grid.items():
+            if not values:
+                raise SuiteError(f"{path}: {estimator.id}: grid.{name} is empty; give its values, or leave it out")
 
 
 def _check_tuning(written: _File, path: Path) -> None:

@@ -7,12 +7,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
+from zipfile import BadZipFile
 
 from benchmarks.cell import status_of
 from benchmarks.faults.faults import apply_faults
 from benchmarks.lane import Lane, run_lane
 from benchmarks.metrics.archive import from_bytes, to_bytes
+from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.innovations import innovation_metrics
+from benchmarks.metrics.track import Track
 from benchmarks.review.frame import Frame
 from benchmarks.runner.definition import CLEAN, CellLimits
 from benchmarks.runner.judge import judge
@@ -97,11 +100,20 @@ def keep(cell: Cell, store: Store, lane: Lane, run: Run | None, ended: str = "cr
     )
 
 
+def stored_track(cell: Cell, store: Store) -> tuple[Track, FateColumns]:
+    """What the contestant said and what became of its readings; raises `FusionError` when that is damaged."""
+    place = ("estimates", cell.estimate_key, "track.npz")
+    try:
+        return from_bytes(store.read(*place))
+    except (ValueError, KeyError, EOFError, BadZipFile) as error:
+        raise store.damaged(*place, error) from error
+
+
 def score(cell: Cell, store: Store) -> str:
     """Judge the estimate in the store, unless that was done; answers the status."""
     if not store.has("scores", cell.score_key):
         made = store.read_json("estimates", cell.estimate_key, "result.json")
-        track, fates = from_bytes(store.read("estimates", cell.estimate_key, "track.npz"))
+        track, fates = stored_track(cell, store)
         judged = judge(cell, track)
         measured = {} if judged is None else judged.metrics
         said = (measured.get("availability", math.nan), measured.get("pos_p50", math.nan))

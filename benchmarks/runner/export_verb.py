@@ -16,6 +16,7 @@ from benchmarks.runner.definition import Suite
 from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.results import ALIVE, Result, flat, leaderboard, record
 from benchmarks.sheet import Sheet, as_markdown
+from fusion import ParameterError
 
 LATEX_SPECIAL = {letter: f"\\{letter}" for letter in "_%&#${}"} | {
     "\\": r"\textbackslash{}",
@@ -97,8 +98,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write what is asked for."""
+    """Write what is asked for; raises `ParameterError` when that is nothing."""
     suite, results = stored_results(arguments)
+    if all(getattr(arguments, kind) is None for kind in WRITERS):
+        raise ParameterError(f"nothing is asked for; give at least one of --{', --'.join(WRITERS)}")
     for kind, (writer, _) in WRITERS.items():
         path = getattr(arguments, kind)
         if path is not None:

@@ -15,12 +15,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.arguments import at_least_one
 from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.metrics.track import Floats
+from benchmarks.page import data_of
 from benchmarks.runner.definition import CLEAN, Gate, load_suite
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.plan_verb import suite_options
-from benchmarks.runner.results import ALIVE, Result, by_contestant, read_results, score_matrix
+from benchmarks.runner.results import ALIVE, Result, by_contestant, read_results, require_metric, score_matrix
 from benchmarks.runner.store import Store
 from benchmarks.runner.verify_verb import differing
 from benchmarks.statistics.verdict import compare
@@ -124,26 +126,38 @@ def _ratio(name: str, metric: str, margin: float, now: Floats, before: Floats) -
 
 
 def read_baseline(path: Path) -> Baseline:
-    """What `fusion bench export --json` has written, by contestant; raises `SuiteError`."""
+    """What `fusion bench export --json`, or `report --html`, has written, by contestant; raises `SuiteError`."""
     try:
-        stored = json.loads(path.read_text(encoding="utf-8"))
-        rows, version = stored["results"], stored["metrics_version"]
+        text = path.read_text(encoding="utf-8")
+        stored = data_of(text) if path.suffix == ".html" else json.loads(text)
+        version, grouped = stored["metrics_version"], _by_estimator(stored["results"])
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise SuiteError(f"{path}: no baseline ({error!r}); write one with `fusion bench export --json`") from error
+        raise SuiteError(f"{path}: no baseline ({error}); write one with `fusion bench export --json`") from error
     if version != METRICS_VERSION:
         raise SuiteError(f"{path}: of metrics {version}, these are {METRICS_VERSION}; write the baseline anew")
+    return grouped
+
+
+def _by_estimator(rows: Sequence[Mapping[str, Any]]) -> Baseline:
+    """The rows without faults; raises what rows raise that are none."""
     grouped: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
-        if row["fault"] == CLEAN:
-            grouped.setdefault(row["estimator"], []).append(row)
+        estimator, fault, *_ = (row[key] for key in ("estimator", "fault", "run", "seed", "status"))
+        if fault == CLEAN:
+            grouped.setdefault(estimator, []).append(row)
     return grouped
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion bench gate``."""
     suite_options(parser)
-    parser.add_argument("--baseline", type=Path, metavar="F", help="in place of the one the suite names")
-    parser.add_argument("--verify", type=int, default=0, metavar="N", help="compute N cells again and compare")
+    parser.add_argument(
+        "--baseline",
+        type=Path,
+        metavar="F",
+        help="in place of the suite's: JSON of export, or HTML of report",
+    )
+    parser.add_argument("--verify", type=at_least_one, default=0, metavar="N", help="compute N cells again and compare")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -164,6 +178,8 @@ def _findings(arguments: argparse.Namespace) -> list[Finding]:
     if len(results) < len(cells) or not results:
         return [Finding(Outcome.NOT_MEASURED, f"{len(results)} of {len(cells)} cells are there; run the suite first")]
     named = arguments.baseline or (suite.folder / suite.gate.baseline if suite.gate.baseline else None)
+    for metric in {*suite.gate.ratio, *suite.gate.floor, *suite.gate.inside}:
+        require_metric(metric, results)
     found = judge(results, suite.gate, read_baseline(named) if named else None)
     found += [
         Finding(Outcome.NOT_DETERMINISTIC, f"{cell}: computed again, it differs")

@@ -17,6 +17,8 @@ from benchmarks.runner.store import Store
 from benchmarks.sheet import Sheet
 from benchmarks.statistics.verdict import Comparison, compare
 from benchmarks.table import COLUMNS, as_text
+from fusion import ParameterError
+from fusion.errors import did_you_mean
 
 RANKED_BY = "pos_p75"
 ALIVE = ("ok", "unscored")
@@ -47,6 +49,13 @@ def read_results(cells: Iterable[Cell], store: Store) -> list[Result]:
             told = (scored["status"], made["error"], made["digest"], read_metrics(scored), made, scored["worst_at_s"])
             found.append(Result(cell, *told))
     return found
+
+
+def require_metric(metric: str, results: Sequence[Result]) -> None:
+    """Raises `ParameterError` for a metric that no cell has; where no cell has any, nothing can be said."""
+    known = {name for result in results for name in result.metrics}
+    if known and metric not in known:
+        raise ParameterError(f"the suite has no metric {metric!r}; {did_you_mean(metric, sorted(known))}")
 
 
 def judged(results: Sequence[Result]) -> list[Result]:

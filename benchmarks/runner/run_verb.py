@@ -55,12 +55,18 @@ def _carried_out(
     return execute(todo, store, workers=min(count, len(todo)), limits=suite.limits)
 
 
+def lost(results: Sequence[Result]) -> list[str]:
+    """Why contestants have no answer in some cells, one sentence for each reason they gave."""
+    counted = Counter((one.cell.contestant.id, one.error) for one in results if one.error is not None)
+    return [f"{name} lost {count} of its cells: {error}" for (name, error), count in counted.items()]
+
+
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion bench run``."""
     suite_options(parser)
     parser.add_argument("-j", "--workers", type=at_least_one, metavar="N", help="processes; one per core by default")
     parser.add_argument("--shard", type=_shard, metavar="I/N", help="only the I-th of N parts, by key")
-    parser.add_argument("--dask", metavar="ADDRESS", help="carry the cells out on this Dask scheduler")
+    parser.add_argument("--dask", metavar="ADDRESS", help="carry the cells out on this Dask scheduler; its limits hold")
 
 
 def _shard(text: str) -> tuple[int, int]:
@@ -83,5 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
     sys.stderr.write(
         f"fusion bench run: {', '.join(f'{count} {status}' for status, count in sorted(counted.items()))}\n"
     )
+    for reason in lost(results):
+        sys.stderr.write(f"fusion bench run: {reason}\n")
     print_sheets([leaderboard(results)])
     return 0 if any(result.status in ALIVE for result in results) else 1

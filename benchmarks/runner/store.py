@@ -52,8 +52,16 @@ class Store:
             raise FusionError(f"{path}: cannot be read ({error.strerror}); delete its folder and run again") from error
 
     def read_json(self, kind: str, key: str, name: str) -> Any:  # noqa: ANN401 - whatever was written
-        """One file of an entry as JSON."""
-        return json.loads(self.read(kind, key, name))
+        """One file of an entry as JSON; raises `FusionError` when it is damaged, as after a disk that was full."""
+        try:
+            return json.loads(self.read(kind, key, name))
+        except ValueError as error:
+            raise self.damaged(kind, key, name, error) from error
+
+    def damaged(self, kind: str, key: str, name: str, error: Exception) -> FusionError:
+        """What to raise for a file of an entry that cannot be what was written."""
+        path = self.place(kind, key) / name
+        return FusionError(f"{path}: is damaged ({error}); delete {path.parent} and run again")
 
     def write(self, kind: str, key: str, files: Mapping[str, bytes]) -> None:
         """Put an entry in its place; one that is there already is left as it is. Raises `FusionError`."""

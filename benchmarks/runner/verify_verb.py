@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.arguments import at_least_one
 from benchmarks.runner.definition import load_suite
 from benchmarks.runner.execute import carry_out
 from benchmarks.runner.plan import Cell, cells_of
@@ -42,7 +43,7 @@ def _same(cell: Cell, store: Store, again: Store) -> bool:
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion bench verify``."""
     suite_options(parser)
-    parser.add_argument("--sample", type=int, default=10, metavar="N", help="how many cells (%(default)s)")
+    parser.add_argument("--sample", type=at_least_one, default=10, metavar="N", help="how many cells (%(default)s)")
 
 
 def run(arguments: argparse.Namespace) -> int:

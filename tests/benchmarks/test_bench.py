@@ -14,6 +14,7 @@ from benchmarks.lane import run_lane
 from benchmarks.prior import starting_prior
 from benchmarks.table import print_tables, ranked
 from fusion import Covariance, Decision, Estimate, LogError, Odometry, ParameterError, PluginError, Pose, Prior, Truth
+from fusion.cli import main
 from logs.run import Run, TruthTrack
 from logs.writer import RunWriter
 
@@ -220,3 +221,12 @@ def test_prior_from_truth_without_heading_leaves_the_heading_unknown():
 
 def test_unscored_record_has_no_metrics():
     assert "pos_p50" not in Score("run", "toy", "unscored").record()
+
+
+@pytest.mark.parametrize("words", [["bench"], ["review"], ["replay", "--estimator", "ekf"]])
+def test_seed_below_zero_is_refused(words, capsys):
+    """Each estimator that draws used to crash by itself."""
+    with pytest.raises(SystemExit) as refusal:
+        main([*words, "run.mcap", "--seed", "-1"])
+    assert refusal.value.code == 2
+    assert "-1 is no seed; give a whole number from 0 on" in capsys.readouterr().err

@@ -18,7 +18,7 @@ from benchmarks.report.figures import FIGURES
 from benchmarks.report.material import Material
 from benchmarks.report.sensitivity import WITHOUT_TUNE
 from benchmarks.report.tables import credibility, faults, fixes, outages
-from benchmarks.report.verb import report
+from benchmarks.report.verb import as_page, report
 from benchmarks.report.worst import command, worst_moments
 from benchmarks.review.review import review
 from benchmarks.runner.definition import load_suite
@@ -273,6 +273,21 @@ def test_browser_draws_the_page_without_console_errors(place, tmp_path):
     done = chromium(tmp_path, "--window-size=420,2000", f"--screenshot={picture}", target.as_uri())
     assert "CONSOLE" not in done.stderr
     assert picture.stat().st_size > 20_000
+
+
+def test_page_is_a_baseline_for_the_gate(place, material, tmp_path, capsys):
+    page, gated = tmp_path / "page.html", tmp_path / "gated.toml"
+    page.write_bytes(as_page(material))
+    gated.write_text(SUITE + "[gate]\nratio = { pos_p75 = 0.05 }\n", encoding="utf-8")
+    words = ["bench", "gate", str(gated), "--store", str(place / "store"), "--baseline", str(page)]
+    assert main(words) == 0
+    assert capsys.readouterr().out.count("pos_p75 is what it was") == len(material.contestants)
+    text = page.read_text(encoding="utf-8")
+    page.write_text(re.sub(r'"pos_p75": [\d.e-]+', '"pos_p75": 1e-9', text), encoding="utf-8")
+    assert main(words) == 1
+    page.write_text("<!doctype html>", encoding="utf-8")
+    assert main(words) == 2
+    assert "the page holds no numbers" in capsys.readouterr().out
 
 
 GRID = """

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics.alignment import align
-from benchmarks.metrics.instants import Answers, Instants
+from benchmarks.metrics.instants import Instants, match
 from benchmarks.metrics.score import errors, metrics
 from benchmarks.metrics.tracks import read_track, read_truth
 from benchmarks.metrics.trajectory import Poses, relative_errors
@@ -36,9 +36,9 @@ def files(tmp_path, write_tum):
 
 @pytest.fixture
 def pair(files):
-    true, said = read_truth(files[0]), read_track(files[1])
-    answers = Answers(said.valid, said.x, said.y, said.heading, said.covariance, np.zeros(N), np.full(N, np.nan))
-    return Instants(true.time_ns, true.x, true.y, true.heading), answers
+    true = read_truth(files[0])
+    instants = Instants(true.time_ns, true.x, true.y, true.heading)
+    return instants, match(instants, read_track(files[1]))
 
 
 def evo(program, files, folder, *options):

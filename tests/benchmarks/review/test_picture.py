@@ -11,7 +11,7 @@ from benchmarks.review import blueprint, picture, viewer
 from benchmarks.review.picture import SIZE, headless_viewer, render
 from benchmarks.review.review import review
 from benchmarks.review.viewer import go_to, has_display
-from fusion import LogError, PluginError, ViewerError
+from fusion import FusionError, LogError, PluginError, ViewerError
 from sensors.simulate import simulate
 
 
@@ -115,8 +115,9 @@ def test_picture_that_cannot_be_written_is_told(tmp_path):
     pytest.importorskip("rerun", reason="needs the extra `review`")
     (tmp_path / "scene.rrd").write_bytes(b"")
     (tmp_path / "file").write_bytes(b"")
-    with pytest.raises(ViewerError, match="cannot be written"):
-        render([tmp_path / "scene.rrd"], tmp_path / "file" / "review.png")
+    for nowhere in (tmp_path / "file" / "review.png", tmp_path):
+        with pytest.raises(FusionError, match="cannot be written"):
+            render([tmp_path / "scene.rrd"], nowhere)
 
 
 def test_missing_scene_log_and_estimator_are_refused(log, tmp_path):

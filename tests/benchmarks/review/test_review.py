@@ -108,3 +108,11 @@ def test_made_up_run_of_the_cost_measurement_is_written(tmp_path):
     measure = runpy.run_path(str(Path(__file__).with_name("long_review.py")))
     assert measure["cost_s"](500, 2, tmp_path / "long.rrd") > 0.0
     assert (tmp_path / "long.rrd").stat().st_size > 10_000
+
+
+def test_time_that_is_none_of_the_run_is_refused_before_any_work(log, tmp_path, capsys):
+    pytest.importorskip("rerun", reason="needs the extra `review`")
+    code, _, err = told(capsys, log, "--estimators", "ekf", "--save", tmp_path / "r.rrd", "--at", "31")
+    assert (code, list(tmp_path.iterdir())) == (1, [])
+    assert "--at 31: " in err
+    assert "give a time in between" in err

@@ -134,7 +134,7 @@ def test_review_holds_floor_truth_tracks_errors_weights_and_readings(tmp_path):
     chunks = review_of(tmp_path, "toy")
     parts = {"path", "trail", "pose"}
     expected = {"/map", "/map/walls", "/map/anchor/b", "/map/legend/toy", "/scores"}
-    expected |= {f"/map/truth/{part}" for part in parts} | {f"/map/estimate/toy/{part}" for part in parts}
+    expected |= {f"/map/truth/{part}" for part in (*parts, "heading")} | {f"/map/estimate/toy/{part}" for part in parts}
     expected |= {"/map/estimate/toy/covariance", "/error/toy", "/heading_error/toy"}
     expected |= {"/weight/toy/b", "/nis/toy/b", "/rssi/b"}
     assert expected <= chunks.keys()
@@ -314,7 +314,9 @@ def test_estimator_without_answers_and_crashed_one_have_a_legend_and_no_track(tm
 def test_score_table_ranks_the_live_first_and_tells_the_crash(tmp_path):
     _, scores = scored(run_of(tmp_path), ["broken", "toy"])
     lines = markdown(scores).splitlines()
+    assert lines[0].endswith("| age | gaps |")
     assert lines[2].startswith("| toy | 50.0 |")
+    assert lines[2].endswith(" | 0 |")
     assert lines[3].startswith("| broken (crashed) |")
     assert "on purpose" in lines[-1]
 

@@ -54,6 +54,12 @@ def test_grid_is_spread_into_contestants_with_their_own_ids(tmp_path):
         ('[[faults]]\nid = "clean"', "the id 'clean' is given twice"),
         ("[gates]", "did you mean 'gate'"),
         ('[gate]\nratio = { pos_p75 = "small" }', "gate.ratio.pos_p75: expected float"),
+        ('[gate]\ninconclusive = "wran"', "did you mean 'warn'"),
+        (
+            '[[runs]]\nid = "b"\nscenario = "office"\nduration_s = -1.0',
+            r"runs\[1\] \(b\).duration_s: -1 is not above 0",
+        ),
+        ('[[estimators]]\nid = "pf"\nuse = "particle"\ngrid = { particles = [] }', "pf: grid.particles is empty"),
         ("x = [", "not TOML"),
     ],
 )
@@ -69,6 +75,11 @@ def test_wrong_suite_is_refused_and_says_where(tmp_path, more, message):
         ("seeds = 0", "0 seeds from seed 0"),
         ('seeds = 2\neval = { reading = "casual" }', "did you mean 'causal'"),
         ("seeds = 2\nlimits = { wall = 3 }", "did you mean 'wall_s'"),
+        ("seeds = 2\nlimits = { wall_s = 0.0 }", "limits.wall_s: 0 is not above 0"),
+        ("seeds = 2\nlimits = { rss_mb = -1 }", "limits.rss_mb: -1 is not above 0"),
+        ("seeds = 2\neval = { hz = 0 }", "eval.hz: 0 is not above 0"),
+        ("seeds = 2\neval = { max_age_s = -0.5 }", "eval.max_age_s: -0.5 is not above 0"),
+        ("seeds = 2\neval = { gap_s = 0.0 }", "eval.gap_s: 0 is not above 0"),
     ],
 )
 def test_wrong_head_is_refused(tmp_path, line, message):

@@ -17,14 +17,14 @@ from benchmarks.metrics.instants import evaluation_instants, match
 from benchmarks.metrics.score import errors
 from benchmarks.prior import begin_ns
 from benchmarks.runner.definition import load_suite
-from benchmarks.runner.execute import carry_out, faulty_run
+from benchmarks.runner.execute import carry_out, faulty_run, stored_track
 from benchmarks.runner.export_verb import as_csv
 from benchmarks.runner.plan import cells_of, missing, shard
 from benchmarks.runner.results import flat, leaderboard, read_results
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store
-from fusion import SuiteError
+from fusion import FusionError, SuiteError
 from fusion.cli import main
 from sensors.simulate import simulate
 
@@ -274,6 +274,27 @@ def test_stored_metrics_are_the_numbers_of_the_score(suite, tmp_path):
     results = run_suite(suite, Store(tmp_path / "store"), workers=1)
     assert all(np.isfinite(result.metrics["pos_p75"]) for result in results)
     assert all(result.metrics["availability"] == 1.0 for result in results)
+
+
+def test_run_tells_why_cells_were_lost(tmp_path, capsys):
+    refused = '[[estimators]]\nid = "none"\nuse = "particle"\nparams = { particles = -3 }\n'
+    (tmp_path / "small.toml").write_text(SUITE + refused, encoding="utf-8")
+    assert main(["bench", "run", str(tmp_path / "small.toml"), "--store", str(tmp_path / "store"), "-j", "1"]) == 0
+    told = capsys.readouterr().err
+    assert "4 crashed, 8 ok" in told
+    assert "none lost 4 of its cells: particle: particles is -3" in told
+
+
+def test_damaged_track_is_told_not_traced(suite, tmp_path):
+    store, cell = Store(tmp_path / "store"), cells_of(suite, Store(tmp_path / "store"))[0]
+    carry_out((cell, store.folder))
+    assert len(stored_track(cell, store)[0].time_ns) > 0
+    path = store.place("estimates", cell.estimate_key) / "track.npz"
+    whole = path.read_bytes()
+    for broken in (b"", b"no archive", whole[:-100]):
+        path.write_bytes(broken)
+        with pytest.raises(FusionError, match="is damaged"):
+            stored_track(cell, store)
 
 
 def test_missing_suite_is_one_sentence(tmp_path):

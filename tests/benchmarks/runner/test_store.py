@@ -36,6 +36,13 @@ def test_half_an_entry_that_a_killed_runner_left_is_no_entry(tmp_path):
     assert store.has("scores", KEY)
 
 
+def test_damaged_entry_is_told_with_the_folder_to_delete(tmp_path):
+    store = Store(tmp_path)
+    store.write("scores", KEY, {"result.json": b"{"})
+    with pytest.raises(FusionError, match=f"is damaged .*; delete {store.place('scores', KEY)} and run again"):
+        store.read_json("scores", KEY, "result.json")
+
+
 def test_place_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "scores").write_text("a file where a folder should be")
     with pytest.raises(FusionError, match=r"cannot be written .* --store"):

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.runner.compare_verb import stored_results
 from benchmarks.runner.definition import Contestant, FaultSet, Gate, RunSource, load_suite
 from benchmarks.runner.export_verb import as_junit, as_latex
@@ -163,6 +164,46 @@ def test_gate_answers_with_the_exit_code_of_its_gravest_finding(place, tmp_path,
     empty = ["bench", "gate", str(place / "suite.toml"), "--store", str(tmp_path / "empty")]
     assert main(empty) == Outcome.NOT_MEASURED
     assert "not measured: 0 of 16 cells are there" in capsys.readouterr().out
+
+
+def test_gate_for_a_metric_that_no_cell_has_never_passes(place, results, tmp_path, capsys):
+    """A misspelt metric is infinite in every cell, now and before: that used to be "what it was"."""
+    misspelt = tmp_path / "suite.toml"
+    misspelt.write_text((HEAD + RUNS + TAIL).replace("pos_p75 =", "pos_p755 ="))
+    assert main(words(place, "export", "--json", str(tmp_path / "base.json"))) == 0
+    asked = ["bench", "gate", str(misspelt), "--store", str(place / "store"), "--baseline", str(tmp_path / "base.json")]
+    assert main(asked) == Outcome.USAGE
+    assert "no metric 'pos_p755'; did you mean 'pos_p75'?" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param(b"\x89MCAP0\r\n" * 1000, id="a log"),
+        pytest.param(b"[1]", id="a list"),
+        pytest.param(json.dumps({"metrics_version": METRICS_VERSION, "results": [{}]}).encode(), id="a row of nothing"),
+        pytest.param(json.dumps({"metrics_version": METRICS_VERSION, "results": 3}).encode(), id="no rows"),
+    ],
+)
+def test_file_that_is_no_baseline_is_told_in_a_line(place, tmp_path, content, capsys):
+    (tmp_path / "base").write_bytes(content)
+    assert main(words(place, "gate", "--baseline", str(tmp_path / "base"))) == Outcome.USAGE
+    said = capsys.readouterr().out
+    assert "no baseline (" in said
+    assert len(said) < 300
+
+
+@pytest.mark.parametrize("more", [["gate", "--verify", "-3"], ["verify", "--sample", "0"]])
+def test_no_cell_at_all_is_no_sample(place, more, capsys):
+    with pytest.raises(SystemExit) as refusal:
+        main(words(place, *more))
+    assert refusal.value.code == Outcome.USAGE
+    assert "give a whole number from 1 on" in capsys.readouterr().err
+
+
+def test_export_of_nothing_is_refused(place, capsys):
+    assert main(words(place, "export")) == 1
+    assert "give at least one of --json, --csv" in capsys.readouterr().err
 
 
 def test_baseline_of_other_metrics_is_refused(place, tmp_path, capsys):

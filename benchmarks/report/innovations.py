@@ -1,0 +1,75 @@
+"""Whether readings came as far off as each estimator expected: the mean NIS of every sensor, with its band."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.metrics.consistency import CEILING
+from benchmarks.metrics.fates import FateColumns
+from benchmarks.metrics.innovations import NAMES
+from benchmarks.metrics.quantiles import mean
+from benchmarks.metrics.samples import effective_sizes, mean_chi_square_band
+from benchmarks.report.cells import link
+from benchmarks.report.material import Material
+from benchmarks.runner.results import by_contestant, median_metrics
+from benchmarks.sheet import Sheet
+
+
+class MeanNis(NamedTuple):
+    """The mean NIS of one kind of sensor, ideal 1, and the band that holds an honest filter's with 95 %."""
+
+    mean: float
+    low: float
+    high: float
+
+    @property
+    def is_inside(self) -> bool:
+        """Whether the filter may be honest."""
+        return self.low <= self.mean <= self.high
+
+
+def mean_nis(fates: FateColumns) -> dict[str, MeanNis]:
+    """Of every kind of sensor whose readings the estimator predicts; refused readings count, as in `nis95_wifi`.
+
+    Every reading is a scalar, so chi-square of one degree. The band takes the effective number of readings, by the
+    correlation in time of each anchor's own; what anchors have in common at one time is not in it.
+    """
+    known, found = np.isfinite(fates.nis), {}
+    for kind, name in enumerate(NAMES):
+        own = np.flatnonzero(known & (fates.kind == kind))
+        if len(own):
+            own = own[np.argsort(fates.source[own], kind="stable")]
+            nis = np.minimum(fates.nis[own], CEILING)
+            (samples,) = effective_sizes(nis[None], fates.source[own].astype(np.int64)).tolist()
+            found[name] = MeanNis(mean(nis), *mean_chi_square_band(1.0, samples))
+    return found
+
+
+def innovations(material: Material) -> Sheet:
+    """One row for each estimator and sensor, one column for each shown run: a mean outside its band is bold."""
+    found = {key: mean_nis(series.fates) for key, series in material.series.items()}
+    head = ("estimator", "sensor", "inside 95 %, median", *material.scored_runs)
+    title = "Innovations: mean NIS [band of an honest filter, 95 %]; above: surer of its readings than right"
+    return Sheet(title, head, tuple(_rows(material, found)))
+
+
+def _rows(material: Material, found: dict[tuple[str, str], dict[str, MeanNis]]) -> Iterator[tuple[str, ...]]:
+    grouped = by_contestant(material.results)
+    for name in material.contestants:
+        medians = median_metrics(grouped[name])
+        of_runs = {run_id: found.get((run_id, name), {}) for run_id in material.scored_runs}
+        for sensor in NAMES:
+            if any(sensor in told for told in of_runs.values()):
+                share = medians.get(f"nis95_{sensor}", np.nan)
+                cells = (_cell(material, run_id, name, told.get(sensor)) for run_id, told in of_runs.items())
+                yield (name, sensor, "–" if np.isnan(share) else f"{100.0 * share:.0f} %", *cells)
+
+
+def _cell(material: Material, run_id: str, name: str, told: MeanNis | None) -> str:
+    if told is None:
+        return "–"
+    number = link(material, f"{told.mean:.2f}", material.series[run_id, name].result)
+    return f"{number if told.is_inside else f'**{number}**'} [{told.low:.2f}, {told.high:.2f}]"

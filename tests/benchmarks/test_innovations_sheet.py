@@ -1,0 +1,91 @@
+"""Mean NIS in a report: an honest filter's lies in its band, and correlated readings prove less."""
+
+import re
+
+import numpy as np
+import pytest
+
+from benchmarks.metrics.fates import FateColumns
+from benchmarks.report.innovations import innovations, mean_nis
+from benchmarks.report.material import Material
+from benchmarks.report.verb import report
+from benchmarks.runner.definition import load_suite
+from benchmarks.runner.plan import cells_of
+from benchmarks.runner.results import read_results
+from benchmarks.runner.run_verb import run_suite
+from benchmarks.runner.store import Store
+
+WIFI, RANGES = 0, 1
+N = 4000
+
+
+def fates_of(nis, kind, anchor):
+    n, none = len(nis), np.zeros(len(nis), dtype=np.int16)
+    columns = (np.arange(n), np.full(n, kind), none, anchor, none, none, np.ones(n), np.zeros(n), np.ones(n), nis)
+    return FateColumns(*map(np.asarray, columns), np.array(["a", "b", "c"]))
+
+
+@pytest.fixture
+def innovation():
+    """White and of variance one: what an honest filter's scaled innovations are."""
+    return np.random.default_rng(7).normal(size=N)
+
+
+def test_mean_of_an_honest_filter_lies_in_the_band_of_as_many_readings(innovation):
+    told = mean_nis(fates_of(innovation**2, WIFI, np.arange(N) % 2))
+    assert told.keys() == {"wifi"}
+    assert told["wifi"].mean == pytest.approx(np.mean(innovation**2), rel=1e-12)
+    assert told["wifi"].is_inside
+    # The normal approximation of chi-square: the mean of N squares has the variance 2 / N.
+    assert told["wifi"].high - 1.0 == pytest.approx(1.96 * np.sqrt(2.0 / N), rel=0.25)
+
+
+@pytest.mark.parametrize("claimed", [0.25, 4.0])
+def test_claims_that_are_wrong_by_four_lie_outside(innovation, claimed):
+    told = mean_nis(fates_of(innovation**2 / claimed, RANGES, np.zeros(N, dtype=int)))["ranges"]
+    assert not told.is_inside
+    assert told.mean > told.high if claimed < 1.0 else told.mean < told.low
+
+
+def test_readings_that_repeat_each_other_prove_less(innovation):
+    alike = np.repeat(innovation[: N // 20], 20)
+    told = mean_nis(fates_of(alike**2, WIFI, np.zeros(N, dtype=int)))["wifi"]
+    white = mean_nis(fates_of(innovation**2, WIFI, np.zeros(N, dtype=int)))["wifi"]
+    assert told.high - told.low > 3.0 * (white.high - white.low)
+
+
+def test_readings_without_a_prediction_have_no_row():
+    assert mean_nis(fates_of(np.full(N, np.nan), WIFI, np.zeros(N, dtype=int))) == {}
+
+
+SUITE = """
+[suite]
+name = "nis"
+[[runs]]
+id = "mec"
+scenario = "mec"
+duration_s = 20.0
+[[estimators]]
+id = "ekf"
+use = "ekf"
+[[estimators]]
+id = "wheels"
+use = "dead_reckoning"
+"""
+
+
+def test_report_tells_the_mean_nis_of_its_cells_and_marks_what_lies_outside(tmp_path):
+    (tmp_path / "suite.toml").write_text(SUITE, encoding="utf-8")
+    suite, store = load_suite(tmp_path / "suite.toml"), Store(tmp_path / "store")
+    run_suite(suite, store, workers=1)
+    material = Material(suite, read_results(cells_of(suite, store), store), store)
+    (row,) = innovations(material).rows
+    cell = material.series["mec", "ekf"]
+    assert row[:2] == ("ekf", "wifi")
+    assert row[2] == f"{100.0 * cell.result.metrics['nis95_wifi']:.0f} %"
+    bold, mean, low, high = re.fullmatch(
+        r"(\*\*)?\[([\d.]+)\]\(#cell-\d+\)(?:\*\*)? \[([\d.]+), ([\d.]+)\]", row[3]
+    ).groups()
+    assert mean == f"{np.nanmean(cell.fates.nis):.2f}"
+    assert (bold is None) == (float(low) <= float(mean) <= float(high))
+    assert "**Innovations: mean NIS" in report(material)
