@@ -58,7 +58,7 @@ class Lines(Protocol):
         """Whether there is something to read, waiting at most so long for it."""
 
     def read(self) -> list[Edge]:
-        """What was seen; raises OSError when the chip is gone."""
+        """All that was seen and not read; raises OSError when the chip is gone."""
 
     def close(self) -> None:
         """Let go."""
@@ -88,8 +88,8 @@ class GpioLines:
         return bool(self._request.wait_edge_events(timeout_s))
 
     def read(self) -> list[Edge]:
-        """What was seen."""
-        return [Edge(event.line_offset, event.line_seqno) for event in self._request.read_edge_events()]
+        """All that was seen and not read: left to itself the library would hand out 64 edges at a time."""
+        return [Edge(event.line_offset, event.line_seqno) for event in self._request.read_edge_events(BUFFER)]
 
     def close(self) -> None:
         """Let go."""
@@ -178,12 +178,12 @@ class Encoders:
         self._device.close()
 
     def _count(self, timeout_s: float) -> None:
-        """Take what the kernel has, then what comes next."""
-        while self._device.wait(timeout_s):
-            timeout_s = 0.0
-            for edge in self._device.read():
-                self._unseen += edge.number - self._number[edge.line] - 1
-                self._number[edge.line] = edge.number
+        """Take what the kernel has, all of it, once: a line that chatters without end must not hold up the report."""
+        if not self._device.wait(timeout_s):
+            return
+        for edge in self._device.read():
+            self._unseen += edge.number - self._number[edge.line] - 1
+            self._number[edge.line] = edge.number
 
     def _report(self, now_ns: int) -> Iterator[Said]:
         """The counts, true a debouncing time ago: an edge since then may not have been told yet."""

@@ -53,6 +53,19 @@ def test_edges_that_nobody_read_count_all_the_same_and_are_told(wheels):
     assert dict(remark.values)["edges"] == str(2 * 1550 - BUFFER)
 
 
+def test_a_line_that_chatters_without_end_does_not_hold_up_the_report(wheels, monkeypatch):
+    driver, device = wheels
+    asked = []
+
+    def chatter(_):
+        asked.append(device.turn(1))
+        assert len(asked) < 1_000_000, "the driver goes on reading for ever"
+        return True
+
+    monkeypatch.setattr(device, "wait", chatter)
+    assert counts(driver)[0] > 0
+
+
 def test_counting_goes_on_after_an_unplugged_chip(wheels):
     driver, device = wheels
     device.turn(7)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from kernel.guest.system import load, wait_until
 
-CONFIG = Path("/sys/kernel/config")
+CONFIG, DRIVER = Path("/sys/kernel/config"), Path("/sys/bus/platform/drivers/gpio-sim")
 INPUT, EDGE_RISING = 1 << 2, 1 << 4
 REQUEST = struct.Struct("=64I32sQI20x240xII20xi")
 GET_LINE = 3 << 30 | REQUEST.size << 16 | 0xB4 << 8 | 0x07
@@ -56,7 +56,12 @@ class SimulatedGpio:
 
     def unplug(self) -> None:
         """Take the chip from its driver, as a USB adapter pulled out would be."""
-        Path("/sys/bus/platform/drivers/gpio-sim/unbind").write_text(self._platform)
+        (DRIVER / "unbind").write_text(self._platform)
+
+    def plug(self) -> None:
+        """Give it back."""
+        (DRIVER / "bind").write_text(self._platform)
+        wait_until(self.device.exists, "the GPIO chip")
 
 
 class Edge(NamedTuple):

@@ -38,3 +38,7 @@ class StubMpu6050:
         (self._folder / "new_device").write_text(f"mpu6050 {ADDRESS:#x}")
         wait_until((IIO / "in_anglvel_z_raw").exists, "the IIO device")
         return IIO
+
+    def unbind_kernel_driver(self) -> None:
+        """Take the chip from the kernel again."""
+        (self._folder / "delete_device").write_text(f"{ADDRESS:#x}")
