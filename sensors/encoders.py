@@ -121,6 +121,7 @@ class Encoders:
             raise SettingError(f"{name}: hz = {hz}, debounce_s = {debounce_s}", "give hz > 0 and 0 <= debounce_s < 1")
         self._name, self._clock, self._device = name, clock, device()
         self._chip, self._lines, self._hz, self._debounce_s = chip, tuple(lines), hz, debounce_s
+        self._period_ns = nanoseconds(1.0 / hz)
         self._before = dict.fromkeys(lines, 0)
         """Counts until the lines were requested."""
         self._number = dict.fromkeys(lines, 0)
@@ -164,10 +165,13 @@ class Encoders:
         left_s = min(seconds(self._due_ns - self._clock.now_ns()), timeout_s)
         try:
             self._count(max(left_s, 0.0))
+            began_ns = self._clock.now_ns()
+            if began_ns < self._due_ns:
+                return []
+            self._count(0.0)  # a program may have been held up since it read: counts and stamp must belong together
         except OSError as error:
             raise DeviceLostError(f"{self._name}: {self._chip} went away ({error})", "plug it in again") from error
-        now_ns = self._clock.now_ns()
-        return list(self._report(now_ns)) if now_ns >= self._due_ns else []
+        return list(self._report((began_ns + self._clock.now_ns()) // 2))
 
     def close(self) -> None:
         """Let go of the lines."""
@@ -186,8 +190,12 @@ class Encoders:
             self._number[edge.line] = edge.number
 
     def _report(self, now_ns: int) -> Iterator[Said]:
-        """The counts, true a debouncing time ago: an edge since then may not have been told yet."""
-        self._due_ns = max(self._due_ns + nanoseconds(1.0 / self._hz), now_ns)
+        """The counts, true a debouncing time ago: an edge since then may not have been told yet.
+
+        Reports fall due at whole periods. One that is held up puts off the next, so that none follows within half a
+        period: a single tick in next to no time would look like great speed.
+        """
+        self._due_ns += self._period_ns * ((now_ns - self._due_ns + self._period_ns // 2) // self._period_ns + 1)
         counts = tuple(self._before[line] + self._number[line] for line in self._lines)
         if self._unseen:
             text = f"{self._unseen} edges were counted and not seen one by one: this program was held up"

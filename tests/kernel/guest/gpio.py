@@ -46,7 +46,9 @@ class SimulatedGpio:
 
     def set_level(self, line: int, level: int) -> None:
         """Pull one line up (1) or down (0)."""
-        (self._lines / f"sim_gpio{line}" / "pull").write_text("pull-up" if level else "pull-down")
+        pull = os.open(f"{self._lines}/sim_gpio{line}/pull", os.O_WRONLY)  # a robot's wheels do this all the time
+        os.write(pull, b"pull-up" if level else b"pull-down")
+        os.close(pull)
 
     def pulse(self, line: int, times: int = 1) -> None:
         """Rising edges, each followed by a falling one."""
