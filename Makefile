@@ -14,7 +14,7 @@ test: $(READY)
 
 # The real drivers of a real kernel, emulated: docs/kernel-tier.md.
 test-kernel: kernel-parts
-	$(BIN)/python -m pytest -q -n 2 -m kernel tests/kernel
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m kernel tests/kernel
 
 kernel-parts: $(READY)
 	PYTHONPATH=tests $(BIN)/python -m kernel.fetch

@@ -58,7 +58,7 @@ class Lines(Protocol):
         """Whether there is something to read, waiting at most so long for it."""
 
     def read(self) -> list[Edge]:
-        """What was seen; raises OSError when the chip is gone."""
+        """All that was seen and not read; raises OSError when the chip is gone."""
 
     def close(self) -> None:
         """Let go."""
@@ -88,8 +88,8 @@ class GpioLines:
         return bool(self._request.wait_edge_events(timeout_s))
 
     def read(self) -> list[Edge]:
-        """What was seen."""
-        return [Edge(event.line_offset, event.line_seqno) for event in self._request.read_edge_events()]
+        """All that was seen and not read: left to itself the library would hand out 64 edges at a time."""
+        return [Edge(event.line_offset, event.line_seqno) for event in self._request.read_edge_events(BUFFER)]
 
     def close(self) -> None:
         """Let go."""
@@ -121,6 +121,7 @@ class Encoders:
             raise SettingError(f"{name}: hz = {hz}, debounce_s = {debounce_s}", "give hz > 0 and 0 <= debounce_s < 1")
         self._name, self._clock, self._device = name, clock, device()
         self._chip, self._lines, self._hz, self._debounce_s = chip, tuple(lines), hz, debounce_s
+        self._period_ns = nanoseconds(1.0 / hz)
         self._before = dict.fromkeys(lines, 0)
         """Counts until the lines were requested."""
         self._number = dict.fromkeys(lines, 0)
@@ -164,10 +165,13 @@ class Encoders:
         left_s = min(seconds(self._due_ns - self._clock.now_ns()), timeout_s)
         try:
             self._count(max(left_s, 0.0))
+            began_ns = self._clock.now_ns()
+            if began_ns < self._due_ns:
+                return []
+            self._count(0.0)  # a program may have been held up since it read: counts and stamp must belong together
         except OSError as error:
             raise DeviceLostError(f"{self._name}: {self._chip} went away ({error})", "plug it in again") from error
-        now_ns = self._clock.now_ns()
-        return list(self._report(now_ns)) if now_ns >= self._due_ns else []
+        return list(self._report((began_ns + self._clock.now_ns()) // 2))
 
     def close(self) -> None:
         """Let go of the lines."""
@@ -178,16 +182,20 @@ class Encoders:
         self._device.close()
 
     def _count(self, timeout_s: float) -> None:
-        """Take what the kernel has, then what comes next."""
-        while self._device.wait(timeout_s):
-            timeout_s = 0.0
-            for edge in self._device.read():
-                self._unseen += edge.number - self._number[edge.line] - 1
-                self._number[edge.line] = edge.number
+        """Take what the kernel has, all of it, once: a line that chatters without end must not hold up the report."""
+        if not self._device.wait(timeout_s):
+            return
+        for edge in self._device.read():
+            self._unseen += edge.number - self._number[edge.line] - 1
+            self._number[edge.line] = edge.number
 
     def _report(self, now_ns: int) -> Iterator[Said]:
-        """The counts, true a debouncing time ago: an edge since then may not have been told yet."""
-        self._due_ns = max(self._due_ns + nanoseconds(1.0 / self._hz), now_ns)
+        """The counts, true a debouncing time ago: an edge since then may not have been told yet.
+
+        Reports fall due at whole periods. One that is held up puts off the next, so that none follows within half a
+        period: a single tick in next to no time would look like great speed.
+        """
+        self._due_ns += self._period_ns * ((now_ns - self._due_ns + self._period_ns // 2) // self._period_ns + 1)
         counts = tuple(self._before[line] + self._number[line] for line in self._lines)
         if self._unseen:
             text = f"{self._unseen} edges were counted and not seen one by one: this program was held up"

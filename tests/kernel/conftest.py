@@ -23,7 +23,7 @@ def first_files(machine, tmp_path_factory):
     return target
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def gpio(machine):
     """For tests that need simulated GPIO lines: they skip where those could not be built."""
     if machine.without_gpio:

@@ -9,6 +9,13 @@ pytestmark = pytest.mark.kernel
 
 PULSES = [3, 1, 4, 2]
 UNREAD, BUFFER = 1550, 1024
+REFUSALS = {
+    "second owner": "BusyError",
+    "line that is not there": "SettingError",
+    "chip that is not there": "NotFoundError",
+    "unplugged": "DeviceLostError",
+    "while unplugged": "NotFoundError",
+}
 
 
 @pytest.mark.usefixtures("gpio")
@@ -24,3 +31,20 @@ def test_each_line_counts_its_own_edges_even_those_nobody_read(run_job):
     assert seen["errno of a second owner"] == errno.EBUSY
     assert seen["poll after loss"] == select.POLLERR | select.POLLHUP
     assert seen["errno after loss"] == errno.ENODEV
+
+
+@pytest.mark.usefixtures("gpio")
+def test_the_encoders_driver_keeps_distance_through_everything_and_says_what_happened(run_job):
+    """526 of 1550 edges fell out of the kernel's buffer; the chip was away between the last two counts."""
+    seen = run_job("encoders_driver", pulses=PULSES, unread=UNREAD).answer
+    (chip,) = seen["found"]
+    assert seen["opened"] == {"chip": chip, "lines": [0, 1, 2, 3], "hz": 20.0, "debounce_s": 0.0}
+    assert seen["at rest"] == {"counts": [0, 0, 0, 0], "remarks": []}
+    assert seen["turned"] == {"counts": PULSES, "remarks": []}
+    assert seen["held up"]["counts"] == [PULSES[0] + UNREAD, *PULSES[1:]]
+    assert [remark["edges"] for remark in seen["held up"]["remarks"]] == [str(UNREAD - BUFFER)]
+    assert seen["plugged again"] == {"counts": [2 * PULSES[0] + UNREAD, *(2 * n for n in PULSES[1:])], "remarks": []}
+    for what, kind in REFUSALS.items():
+        assert seen[what][0] == kind, what
+    assert "gpioinfo" in seen["second owner"][1]
+    assert seen["after the first owner"] == []

@@ -1,10 +1,23 @@
 """Counts are the kernel's: a program that is held up loses times and no distance, and unplugging loses nothing."""
 
 import errno
+import itertools
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from fusion import BootClock, BusyError, DeviceLostError, NotPermittedError, Remark, SettingError, WheelTicks
+from fusion import (
+    BootClock,
+    BusyError,
+    DeviceLostError,
+    NotPermittedError,
+    Remark,
+    SettingError,
+    VirtualClock,
+    WheelTicks,
+)
+from fusion.values import seconds
 from sensors.encoders import BUFFER, Edge, Encoders, FakeLines
 
 
@@ -53,6 +66,19 @@ def test_edges_that_nobody_read_count_all_the_same_and_are_told(wheels):
     assert dict(remark.values)["edges"] == str(2 * 1550 - BUFFER)
 
 
+def test_a_line_that_chatters_without_end_does_not_hold_up_the_report(wheels, monkeypatch):
+    driver, device = wheels
+    asked = []
+
+    def chatter(_):
+        asked.append(device.turn(1))
+        assert len(asked) < 1_000_000, "the driver goes on reading for ever"
+        return True
+
+    monkeypatch.setattr(device, "wait", chatter)
+    assert counts(driver)[0] > 0
+
+
 def test_counting_goes_on_after_an_unplugged_chip(wheels):
     driver, device = wheels
     device.turn(7)
@@ -75,6 +101,46 @@ def test_a_stamp_lies_a_debouncing_time_before_its_report():
     report(driver)
     ticks = report(driver)[-1]
     assert device.clock.now_ns() - ticks.time_ns >= 50_000_000
+
+
+class HeldUp(FakeLines):
+    """Wheels that roll at a steady 50 ticks a second past a program that is held up, for ``holds`` [s], as it waits."""
+
+    def __init__(self, holds):
+        super().__init__()
+        self.clock = VirtualClock()
+        self._holds = iter(holds)
+        self._turned = 0
+
+    def wait(self, timeout_s):
+        self.clock.sleep(timeout_s)
+        self._roll()
+        self.clock.sleep(next(self._holds, 0.0))
+        return True
+
+    def read(self):
+        self._roll()
+        edges = super().read()
+        self.clock.sleep(next(self._holds, 0.0))
+        return edges
+
+    def _roll(self):
+        due = self.clock.now_ns() * 50 // 1_000_000_000
+        self.turn(due - self._turned)
+        self._turned = due
+
+
+@given(st.lists(st.sampled_from([0.0, 0.0, 0.001, 0.03, 0.09, 0.2]), max_size=40))
+def test_a_program_that_is_held_up_reports_no_speed_that_was_not_driven(holds):
+    """Ten reports a second; within a tick and what turned between the two sides of one reading, counts fit stamps."""
+    device = HeldUp(holds)
+    driver = Encoders("wheels", device.clock, lines=(17,), hz=10.0, debounce_s=0.0, device=lambda: device)
+    driver.open()
+    reports = [report(driver)[-1] for _ in range(10)]
+    for before, now in itertools.pairwise(reports):
+        assert seconds(now.time_ns - before.time_ns) >= 0.05
+    for one in reports:
+        assert abs(one.counts[0] - 50.0 * seconds(one.time_ns)) <= 1.0 + 50.0 * max([0.0, *holds])
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from kernel.guest.system import load, wait_until
 
-CONFIG = Path("/sys/kernel/config")
+CONFIG, DRIVER = Path("/sys/kernel/config"), Path("/sys/bus/platform/drivers/gpio-sim")
 INPUT, EDGE_RISING = 1 << 2, 1 << 4
 REQUEST = struct.Struct("=64I32sQI20x240xII20xi")
 GET_LINE = 3 << 30 | REQUEST.size << 16 | 0xB4 << 8 | 0x07
@@ -46,7 +46,9 @@ class SimulatedGpio:
 
     def set_level(self, line: int, level: int) -> None:
         """Pull one line up (1) or down (0)."""
-        (self._lines / f"sim_gpio{line}" / "pull").write_text("pull-up" if level else "pull-down")
+        pull = os.open(f"{self._lines}/sim_gpio{line}/pull", os.O_WRONLY)  # a robot's wheels do this all the time
+        os.write(pull, b"pull-up" if level else b"pull-down")
+        os.close(pull)
 
     def pulse(self, line: int, times: int = 1) -> None:
         """Rising edges, each followed by a falling one."""
@@ -56,7 +58,12 @@ class SimulatedGpio:
 
     def unplug(self) -> None:
         """Take the chip from its driver, as a USB adapter pulled out would be."""
-        Path("/sys/bus/platform/drivers/gpio-sim/unbind").write_text(self._platform)
+        (DRIVER / "unbind").write_text(self._platform)
+
+    def plug(self) -> None:
+        """Give it back."""
+        (DRIVER / "bind").write_text(self._platform)
+        wait_until(self.device.exists, "the GPIO chip")
 
 
 class Edge(NamedTuple):

@@ -23,14 +23,13 @@ class StubMpu6050:
         self.bus = int(folder.name.removeprefix("i2c-"))
         self._folder = folder
         wait_until(lambda: Path(f"/dev/i2c-{self.bus}").exists(), "the I2C bus")
-        with SMBus(self.bus) as bus:
-            bus.write_byte_data(ADDRESS, WHO_AM_I, 0x68)
+        self._registers = SMBus(self.bus, force=True)
+        self._registers.write_byte_data(ADDRESS, WHO_AM_I, 0x68, force=True)
 
     def show(self, accel: tuple[int, int, int], temperature: int, gyro: tuple[int, int, int]) -> None:
         """Put one sample into the registers, raw counts, big-endian as the chip has them."""
         sample = struct.pack(">7h", *accel, temperature, *gyro)
-        with SMBus(self.bus, force=True) as bus:
-            bus.write_i2c_block_data(ADDRESS, SAMPLE, list(sample), force=True)
+        self._registers.write_i2c_block_data(ADDRESS, SAMPLE, list(sample), force=True)
 
     def bind_kernel_driver(self) -> Path:
         """Give the chip to the kernel's IIO driver; its folder in sysfs."""
@@ -38,3 +37,7 @@ class StubMpu6050:
         (self._folder / "new_device").write_text(f"mpu6050 {ADDRESS:#x}")
         wait_until((IIO / "in_anglvel_z_raw").exists, "the IIO device")
         return IIO
+
+    def unbind_kernel_driver(self) -> None:
+        """Take the chip from the kernel again."""
+        (self._folder / "delete_device").write_text(f"{ADDRESS:#x}")

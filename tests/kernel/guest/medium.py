@@ -7,6 +7,7 @@ Protocol: drivers/net/wireless/virtual/mac80211_hwsim.h of Linux.
 
 from __future__ import annotations
 
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -31,6 +32,8 @@ REGISTER, FRAME, TX_INFO_FRAME, NEW_RADIO, START_PMSR, REPORT_PMSR = 1, 2, 3, 4,
 RECEIVER, TRANSMITTER, DATA, FLAGS, RX_RATE, SIGNAL, TX_INFO, COOKIE = 1, 2, 3, 4, 5, 6, 7, 8
 NAME, FREQUENCY, PERMANENT_ADDRESS, PMSR_SUPPORT, PMSR_REQUEST, PMSR_RESULT = 17, 19, 22, 26, 27, 28
 STAT_ACK = 4
+SO_RCVBUFFORCE, PATIENCE_BYTES = 33, 1 << 24
+"""socket(7): more than others may ask for. On a busy host the medium falls behind, and what does not fit is lost."""
 PEER_MEASUREMENTS, PEERS, ADDRESS, RESPONSE = 0x111, 5, 1, 4
 
 
@@ -63,6 +66,7 @@ class Medium:
         self.air = air
         self.error: Exception | None = None
         self._hwsim = Family("MAC80211_HWSIM")
+        self._hwsim.socket.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, PATIENCE_BYTES)
         self._hwsim.command(REGISTER)
         self._radios = {address(radio): radio for radio in range(len(air.access_points) + 1)}
         self._closing = threading.Event()

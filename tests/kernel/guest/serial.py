@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import os
+import select
 import termios
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import TracebackType
+from typing import Protocol
 
 from kernel.guest.system import load, unload, wait_until
 
 FAR, NEAR = Path("/dev/ttyGS0"), Path("/dev/ttyACM0")
+REPORT_S = 0.1
 
 
 class UsbSerial:
@@ -45,3 +50,46 @@ def raw(path: Path) -> Iterator[int]:
         yield descriptor
     finally:
         os.close(descriptor)
+
+
+class Firmware(Protocol):
+    """What a module is made of: whether it reports by itself, and what it answers."""
+
+    reports: bool
+
+    def answer(self, data: bytes) -> bytes:
+        """What it sends back for ``data``."""
+
+
+class Module:
+    """Somebody at the far end, in a thread, for the length of a ``with`` block; ``line`` is what it reports by itself.
+
+    Bytes that nobody takes are lost, as on a real module: the far end must not wait, or the cable could not be pulled.
+    """
+
+    def __init__(self, firmware: Firmware, line: str) -> None:
+        self._firmware, self._line = firmware, line.encode()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._serve, name="module", daemon=True)
+
+    def __enter__(self) -> Module:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._closing.set()
+        self._thread.join()
+
+    def _serve(self) -> None:
+        with raw(FAR) as far:
+            os.set_blocking(far, False)
+            while not self._closing.is_set():
+                asked = select.select([far], [], [], REPORT_S)[0]
+                data = self._firmware.answer(os.read(far, 4096)) if asked else self._report()
+                with suppress(BlockingIOError):
+                    os.write(far, data)
+
+    def _report(self) -> bytes:
+        return self._line if self._firmware.reports else b""
