@@ -15,6 +15,8 @@ from logs.device_messages import ClockSync
 STEP_NS = nanoseconds(0.05)
 """Least step of the wall clock against the time since boot that is told; NTP slews by less than this in ten seconds."""
 MOST_TOLD = 10
+OPENED = "opened"
+"""The text of the remark by which a recorder tells what a device says of itself."""
 STATUS = "status"
 """The text of the remark by which a recorder tells, each second, how a sensor does."""
 
@@ -43,7 +45,7 @@ def wall_clock(clocks: Sequence[ClockSync], start_ns: int) -> dict[str, Any] | N
 
 def devices(remarks: Sequence[Remark]) -> dict[str, dict[str, str]]:
     """What each device says of itself, by the name of its sensor: its last opening counts."""
-    return {remark.sensor: dict(remark.values) for remark in remarks if remark.text == "opened"}
+    return {remark.sensor: dict(remark.values) for remark in remarks if remark.text == OPENED}
 
 
 def complaints(remarks: Sequence[Remark]) -> list[tuple[str, int]]:

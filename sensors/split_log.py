@@ -15,6 +15,7 @@ from types import MappingProxyType, TracebackType
 
 from fusion import DeviceInfo, Level, LogError, Prior, Remark, Truth, Update, __version__
 from fusion.values import nanoseconds
+from logs.devices import OPENED
 from logs.writer import RunWriter
 from sensors.computer import boot_id, clock_sync, free_bytes
 from sensors.keeper import Received
@@ -153,7 +154,7 @@ def _about(name: str, info: DeviceInfo, now_ns: int) -> Remark:
     """A device as a remark."""
     settings = json.dumps(dict(info.settings), default=str, sort_keys=True)
     values = (("model", info.model), ("serial", info.serial), ("firmware", info.firmware), ("settings", settings))
-    return Remark(now_ns, name, Level.OK, "opened", values)
+    return Remark(now_ns, name, Level.OK, OPENED, values)
 
 
 def _plain(name: str) -> str:

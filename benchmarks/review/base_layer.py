@@ -10,6 +10,7 @@ from benchmarks.colours import ANCHOR, TRUTH, WALL, anchor_colour
 from benchmarks.metrics.track import Floats, Stamps
 from benchmarks.review.canvas import Canvas, thinned
 from benchmarks.review.cdf import CdfAxes, draw_axes
+from benchmarks.review.device_events import draw_device_events, worth_a_line
 from benchmarks.review.frame import Frame
 from benchmarks.review.heard import Heard
 from benchmarks.review.paths import draw_path
@@ -29,6 +30,7 @@ def draw_base(canvas: Canvas, run: Run, readings: Heard, axes: CdfAxes | None, l
         _draw_truth(canvas, run.truth)
     _draw_readings(canvas, run.world, readings)
     draw_raw_sensors(canvas, raw_series(run.world, run.measurements))
+    draw_device_events(canvas, worth_a_line(run))
     if axes is not None:
         draw_axes(canvas, axes)
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.metrics.score import quantile
+from benchmarks.review.device_events import DEVICES, worth_a_line
 from benchmarks.review.drawing import SHOWN, Drawing
 from benchmarks.review.estimator_plots import AXES
 from benchmarks.review.events import State
@@ -29,7 +30,7 @@ def blueprint(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa:
     """The layout for the lanes ``drawn``, the best first."""
     import rerun.blueprint as rrb
 
-    pages = [_overview(frame, run, drawn), _readings(run, drawn), _motion()]
+    pages = [_overview(frame, run, drawn), _readings(run, drawn), _motion(run)]
     pages += [rrb.Vertical(table_view(drawn), name="Table")] if run.truth is not None else []
     return rrb.Blueprint(
         rrb.Tabs(*pages, active_tab=0),
@@ -125,9 +126,10 @@ def _readings(run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
     return rrb.Vertical(*_radio(run), *([tabs(gates)] if gates else []), name="Radio")
 
 
-def _motion() -> Any:  # noqa: ANN401
-    """The motion sensors as they came."""
+def _motion(run: Run) -> Any:  # noqa: ANN401
+    """The motion sensors as they came, and what became of the devices, where a recorder told it."""
     import rerun.blueprint as rrb
 
     speeds = plot("Speed (m/s)", f"/raw/{SPEED}")
-    return rrb.Vertical(speeds, plot("Turn rate (°/s)", f"/raw/{TURN_RATE}"), name="Motion")
+    devices = [event_view(DEVICES)] if worth_a_line(run) else []
+    return rrb.Vertical(speeds, plot("Turn rate (°/s)", f"/raw/{TURN_RATE}"), *devices, name="Motion")

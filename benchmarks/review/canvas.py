@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from benchmarks.colours import Colour
 from benchmarks.metrics.track import Floats, Stamps
 from benchmarks.review.frame import TIMELINE, UTC
+from fusion.values import NANOSECONDS
 
 MOST_POSES = 6000
 """Poses of one drawn track: more cost the viewer time and show nothing. Scores are never thinned."""
@@ -76,6 +77,12 @@ class Canvas(NamedTuple):
         if finite.any():
             self.style(path, look)
             self.columns(path, time_ns, self.rr.Scalars.columns(scalars=np.where(finite, values, np.nan)))
+
+    def text(self, path: Place, time_ns: Stamps, level: Sequence[str], text: Sequence[str]) -> None:
+        """Lines of a log, each with its time since the start: the viewer's own column is drawn too narrow."""
+        since_start_s = ((time_ns - self.start_ns) / NANOSECONDS).tolist()
+        lines = [f"{at_s:.1f} s  {line}" for at_s, line in zip(since_start_s, text, strict=True)]
+        self.columns(path, time_ns, self.rr.TextLog.columns(text=lines, level=list(level)))
 
     def label(
         self, path: Place, text: str, colour: Colour, place: tuple[float, float], *, radius: float = -6.0

@@ -13,7 +13,6 @@ from benchmarks.review.drawing import Drawing
 from benchmarks.review.events import State
 from benchmarks.review.frame import Frame
 from fusion import Reason, World
-from fusion.values import NANOSECONDS
 
 NIS_LIMIT = 3.841458820694124
 """What the NIS of one scalar reading exceeds once in twenty, if the filter is honest (chi-square, one degree)."""
@@ -125,7 +124,4 @@ def _draw_states(canvas: Canvas, drawing: Drawing) -> None:
 def _draw_events(canvas: Canvas, drawing: Drawing) -> None:
     told = drawing.events
     if told.text:
-        since_start_s = ((told.time_ns - canvas.start_ns) / NANOSECONDS).tolist()
-        text = [f"{at_s:.1f} s  {text}" for at_s, text in zip(since_start_s, told.text, strict=True)]
-        lines = canvas.rr.TextLog.columns(text=text, level=told.level)
-        canvas.columns(["events", drawing.name], told.time_ns, lines)
+        canvas.text(["events", drawing.name], told.time_ns, told.level, told.text)

@@ -145,7 +145,7 @@ def table_view(drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
 
 
 def event_view(name: str) -> Any:  # noqa: ANN401
-    """What happened to one estimator, line by line."""
+    """What happened to one estimator, or to the devices, line by line."""
     import rerun as rr
     import rerun.blueprint as rrb
 

@@ -47,7 +47,7 @@ def test_pages_behind_the_first_are_drawn_without_an_error_of_a_view(log, tmp_pa
     rrb = pytest.importorskip("rerun.blueprint", reason="needs the extra `review`")
 
     def all_pages(frame, run, drawn):
-        pages = (blueprint._readings(run, drawn), blueprint._motion(), blueprint.table_view(drawn))
+        pages = (blueprint._readings(run, drawn), blueprint._motion(run), blueprint.table_view(drawn))
         return rrb.Grid(*pages, blueprint.event_view("radio_only"))
 
     monkeypatch.setattr(blueprint, "_overview", all_pages)
