@@ -21,7 +21,7 @@ from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
 from benchmarks.table import print_tables
 from fusion import FusionError, ViewerError
-from sensors.simulate import simulate
+from sensors.simulation.simulate import simulate
 
 SCENARIO = "office"
 SUITE = Path("quick")

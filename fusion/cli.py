@@ -25,11 +25,11 @@ class Verb(NamedTuple):
 
 VERBS = {
     "demo": Verb("benchmarks.demo", "the whole promise in one command: simulate, record, score, show"),
-    "simulate": Verb("sensors.simulate", "drive a simulated robot and record it as an MCAP log"),
-    "record": Verb("sensors.record", "the sensors of a robot into logs, until somebody says stop"),
-    "live": Verb("sensors.live_verb", "where the robot is, now: sensors through an estimator, a line of JSON a pose"),
-    "doctor": Verb("sensors.doctor", "everything a recording needs, and the cure for what is wrong"),
-    "sensors": Verb("sensors.devices", "what drivers are installed, and which devices are there"),
+    "simulate": Verb("sensors.simulation.simulate", "drive a simulated robot and record it as an MCAP log"),
+    "record": Verb("sensors.onboard.record", "the sensors of a robot into logs, until somebody says stop"),
+    "live": Verb("sensors.onboard.live_verb", "where the robot is, now: sensors through an estimator, JSON lines"),
+    "doctor": Verb("sensors.onboard.doctor", "everything a recording needs, and the cure for what is wrong"),
+    "sensors": Verb("sensors.onboard.devices", "what drivers are installed, and which devices are there"),
     "join": Verb("logs.joining", "the files of one recording become one log"),
     "import": Verb("logs.importing", "turn a recording of another format into an MCAP log"),
     "export": Verb("logs.export", "turn a log into CSV or TUM files"),
@@ -58,7 +58,7 @@ GROUPS = {
         "verify": Verb("benchmarks.runner.verify_verb", "compute stored cells again, they must be the same"),
         "export": Verb("benchmarks.runner.export_verb", "results for other programs"),
     },
-    "sensors": {"test": Verb("sensors.self_test", "run every sensor of a robot for a while: a report to attach")},
+    "sensors": {"test": Verb("sensors.onboard.self_test", "run every sensor for a while: a report to attach")},
     "calibrate": {
         "radio": Verb("benchmarks.calibration.radio_verb", "path loss and shadowing, bias and scale of ranges"),
         "odometry": Verb("benchmarks.calibration.odometry_verb", "scale of either side and the effective track"),

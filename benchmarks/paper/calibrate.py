@@ -20,8 +20,8 @@ from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, WIFI, Environment
 from benchmarks.paper.trial import lane_errors, largest
 from benchmarks.workers import Loss, compute
 from fusion import FusionError
-from sensors.scenario import Scenario
-from sensors.simulate import simulated_run
+from sensors.simulation.scenario import Scenario
+from sensors.simulation.simulate import simulated_run
 
 SEEDS = range(1_000_000, 1_000_400)
 BRACKETS = {ODOMETRY: (0.02, 8.0), WIFI: (0.01, 40.0)}

@@ -13,7 +13,7 @@ from benchmarks.paper.assumptions import ALTERNATIVES, MAIN, Filling, Table, fil
 from benchmarks.paper.calibrate import SEEDS, Solved, solve_all
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, WIFI, Environment
 from fusion import FusionError, WorldError
-from sensors.scenario import Scenario, scenario_text
+from sensors.simulation.scenario import Scenario, scenario_text
 
 COMMAND = "fusion reproduce --calibrate FOLDER"
 ALTERNATIVES_FILE = "alternatives.toml"

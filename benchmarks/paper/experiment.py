@@ -20,7 +20,7 @@ from benchmarks.paper.trial import Trial, run_alternative, run_trial
 from benchmarks.progress import Progress
 from benchmarks.workers import Loss, compute
 from fusion import FusionError, ParameterError
-from sensors.scenario import Scenario, load_scenario
+from sensors.simulation.scenario import Scenario, load_scenario
 
 
 class Outcome(NamedTuple):

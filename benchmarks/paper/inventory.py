@@ -9,7 +9,7 @@ from itertools import pairwise
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.readings import literal
 from benchmarks.sheet import Sheet
-from sensors.scenario import Scenario
+from sensors.simulation.scenario import Scenario
 
 PAPER, CHOSEN, CALIBRATED, READ = "paper", "chosen", "calibrated", "open, read so"
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.metrics.track import Floats
 from fusion import Truth, WheelTicks
-from sensors.scenario import Scenario
-from sensors.simulated import SimulatedRobot
+from sensors.simulation.robot import SimulatedRobot
+from sensors.simulation.scenario import Scenario
 
 MOVES_M = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 2.75, 3.0)
 

@@ -33,7 +33,7 @@ class Environment(NamedTuple):
         return {ODOMETRY: self.odometry_max_m, WIFI: self.wifi_max_m, PROPOSED: self.proposed_max_m}
 
     def place(self, scenarios: Path | None) -> str | Path:
-        """What `sensors.scenario.load_scenario` takes: the built-in scenario, or the one in a folder of one's own."""
+        """What `load_scenario` takes: the built-in scenario, or the one in a folder of one's own."""
         return self.scenario if scenarios is None else scenarios / f"{self.scenario}.toml"
 
 

@@ -20,8 +20,8 @@ from benchmarks.paper.readings import MISSING_OPTION, MISSING_VALUES, ORIGINS_M,
 from benchmarks.paper.variants import leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
 from fusion import Decision, WifiScan
 from logs.run import Run
-from sensors.scenario import Scenario, load_scenario
-from sensors.simulate import simulated_run
+from sensors.simulation.scenario import Scenario, load_scenario
+from sensors.simulation.simulate import simulated_run
 
 GYRO = " + gyro"
 GYRO_LANES = (ODOMETRY, PROPOSED, "bayes_weight", EKF)

@@ -12,7 +12,7 @@ import numpy as np
 from fusion import Gyro, Increment, Measurement, Odometry, Pose, WifiScan, World
 from fusion.odometry import Odometer
 from logs.run import Run
-from sensors.scenario import Reality
+from sensors.simulation.scenario import Reality
 
 MISSING_SHARE = 0.2
 """How often a scan lacks one access point, in the variant with missing Wi-Fi."""

@@ -16,8 +16,8 @@ from fusion.values import nanoseconds
 from logs.reader import read_run
 from logs.rosbag import read_bag
 from logs.run import Run, TruthTrack
-from sensors.scenario import load_scenario, scenario_text
-from sensors.simulate import simulated_run
+from sensors.simulation.scenario import load_scenario, scenario_text
+from sensors.simulation.simulate import simulated_run
 
 KEPT_RUNS = 2
 """Open runs a worker keeps: cells come run by run."""

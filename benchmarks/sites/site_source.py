@@ -10,7 +10,7 @@ from typing import NamedTuple
 from benchmarks.metrics.bound import Radio
 from fusion import Ranges, WifiScan, World
 from logs.reader import read_run
-from sensors.scenario import load_scenario
+from sensors.simulation.scenario import load_scenario
 
 
 class Site(NamedTuple):

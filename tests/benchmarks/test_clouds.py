@@ -9,7 +9,7 @@ from benchmarks.clouds import MOST_CLOUDS, MOST_POINTS, CloudWatch, thinned
 from benchmarks.lane import run_lane
 from fusion import Particles, Ranges, WifiScan
 from logs.reader import read_run
-from sensors.simulate import simulate
+from sensors.simulation.simulate import simulate
 
 MANY = np.random.default_rng(1)
 

@@ -29,7 +29,7 @@ from benchmarks.runner.store import Store
 from fusion.cli import main
 from logs.reader import read_run
 from logs.writer import RunWriter
-from sensors.simulate import simulate
+from sensors.simulation.simulate import simulate
 
 SUITE = """
 [suite]

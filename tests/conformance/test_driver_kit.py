@@ -10,7 +10,7 @@ from fusion.driver import DeviceInfo, DriverSpec
 from fusion.driver_kit import DRIVER_PROMISES, driver_verdict
 from fusion.errors import DeviceLostError, NotPermittedError
 from fusion.values import WheelTicks
-from sensors.simulated_sensor import SimulatedEncoders as Good
+from sensors.simulation.drivers import SimulatedEncoders as Good
 
 
 class NoSummary(Good):

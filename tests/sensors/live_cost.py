@@ -10,10 +10,10 @@ import threading
 import time
 from pathlib import Path
 
-from sensors.live import live
-from sensors.robot_file import RobotFile
-from sensors.scenario import scenario_text
-from sensors.sensing import Sensing
+from sensors.onboard.live import live
+from sensors.onboard.robot_file import RobotFile
+from sensors.onboard.sensing import Sensing
+from sensors.simulation.scenario import scenario_text
 
 
 def robot(folder):

@@ -8,8 +8,8 @@ import pytest
 from fusion import Advice, DriverSpec, Needs
 from fusion.cli import main
 from fusion.values import Gyro
-from sensors import doctor
-from sensors.robot_file import RobotFile, Sensor
+from sensors.onboard import doctor
+from sensors.onboard.robot_file import RobotFile, Sensor
 from tests.sensors.robot_files import robot_text
 
 

@@ -18,7 +18,7 @@ from fusion import (
     WheelTicks,
 )
 from fusion.values import seconds
-from sensors.encoders import BUFFER, Edge, Encoders, FakeLines
+from sensors.wheels.encoders import BUFFER, Edge, Encoders, FakeLines
 
 
 @pytest.fixture

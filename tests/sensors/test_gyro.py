@@ -19,11 +19,11 @@ from fusion import (
     VirtualClock,
     WheelTicks,
 )
-from sensors import gyro_mpu6050
-from sensors.gyro_iio import FakeIio, GyroIio
-from sensors.gyro_mpu6050 import FakeMpu6050, GyroMpu6050, parse
-from sensors.gyro_sampling import UnreadableError
-from sensors.standstill import Standstill
+from sensors.gyro import mpu6050 as gyro_mpu6050
+from sensors.gyro.iio import FakeIio, GyroIio
+from sensors.gyro.mpu6050 import FakeMpu6050, GyroMpu6050, parse
+from sensors.gyro.sampling import UnreadableError
+from sensors.onboard.standstill import Standstill
 
 
 def chip(**settings):

@@ -29,11 +29,11 @@ from fusion import (
 from fusion.cli import main
 from logs.joining import join
 from logs.reader import read_run
-from sensors import split_log
-from sensors.keeper import State
-from sensors.live import Now, live
-from sensors.live_verb import describe, record
-from sensors.robot_file import RobotFile
+from sensors.onboard import split_log
+from sensors.onboard.keeper import State
+from sensors.onboard.live import Now, live
+from sensors.onboard.live_verb import describe, record
+from sensors.onboard.robot_file import RobotFile
 from tests.sensors.robot_files import robot_text
 
 
@@ -247,7 +247,7 @@ def test_with_nothing_left_to_say_it_ends(robot):
 def test_a_disk_that_fills_up_ends_the_recording_and_not_the_pose(robot, tmp_path, monkeypatch):
     full = threading.Event()
     monkeypatch.setattr(split_log, "free_bytes", lambda _: 1e6 if full.is_set() else 1e12)
-    monkeypatch.setattr("sensors.recording.DISK_S", 0.3)
+    monkeypatch.setattr("sensors.onboard.recording.DISK_S", 0.3)
     full_robot = robot(record="min_free_mb = 100.0")
     told = []
     with closing(live(full_robot, "ekf", folder=tmp_path / "out", duration_s=2.0)) as poses:

@@ -6,9 +6,9 @@ from contextlib import suppress
 
 import pytest
 
-from sensors.nl80211 import TRIES, KernelTransport, Nl80211
-from sensors.nl80211_fake import FAMILY, INDEX, FakeKernel
-from sensors.nl80211_message import INTERRUPTED, MULTIPART, Command, Message, decode, encode, encode_end
+from sensors.wifi.nl80211 import TRIES, KernelTransport, Nl80211
+from sensors.wifi.nl80211_fake import FAMILY, INDEX, FakeKernel
+from sensors.wifi.nl80211_message import INTERRUPTED, MULTIPART, Command, Message, decode, encode, encode_end
 
 EVENT = Message(Command.SCAN_ABORTED, {"IFINDEX": 9})
 

@@ -9,8 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from fusion.errors import ProtocolError
-from sensors.ftm import read_attempts
-from sensors.nl80211_message import (
+from sensors.wifi.ftm import read_attempts
+from sensors.wifi.nl80211_message import (
     ACK,
     HEADER,
     MESSAGE,
@@ -21,7 +21,7 @@ from sensors.nl80211_message import (
     encode,
     encode_end,
 )
-from sensors.wifi_reading import read_heard
+from sensors.wifi.reading import read_heard
 
 SCAN_TRIGGER = Message(
     Command.TRIGGER_SCAN,
@@ -126,5 +126,6 @@ def test_a_damaged_message_is_a_message_or_a_protocol_error(message, data):
 
 
 def test_listing_drivers_does_not_bring_pyroute2_in():
-    code = "import sys, sensors.wifi, sensors.wifi_rtt, sensors.nl80211_fake; sys.exit('pyroute2' in sys.modules)"
+    modules = "sensors.wifi.rssi, sensors.wifi.rtt, sensors.wifi.nl80211_fake"
+    code = f"import sys, {modules}; sys.exit('pyroute2' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

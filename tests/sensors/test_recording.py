@@ -19,9 +19,9 @@ from fusion.cli import main
 from fusion.values import Gyro, WheelTicks, WifiScan
 from logs.joining import join
 from logs.reader import read_run
-from sensors import split_log
-from sensors.recording import record
-from sensors.robot_file import RobotFile
+from sensors.onboard import split_log
+from sensors.onboard.recording import record
+from sensors.onboard.robot_file import RobotFile
 from tests.sensors.robot_files import robot_text
 
 LOST_AT_MOST_S = 1.2

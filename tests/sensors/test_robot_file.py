@@ -5,7 +5,7 @@ import math
 import pytest
 
 from fusion import BootClock, FusionError, SettingError
-from sensors.robot_file import RobotFile, Sensor, build_driver
+from sensors.onboard.robot_file import RobotFile, Sensor, build_driver
 from tests.sensors.robot_files import robot_text
 
 

@@ -23,10 +23,10 @@ from fusion import (
 )
 from fusion.odometry import Odometer
 from logs.reader import read_run
-from sensors.route import drive
-from sensors.scenario import builtin_names, load_scenario
-from sensors.simulate import simulate, simulated_run
-from sensors.simulated import SimulatedRobot
+from sensors.simulation.robot import SimulatedRobot
+from sensors.simulation.route import drive
+from sensors.simulation.scenario import builtin_names, load_scenario
+from sensors.simulation.simulate import simulate, simulated_run
 
 NO_ERRORS = dict.fromkeys(
     [

@@ -21,12 +21,14 @@ from fusion import (
     SettingError,
     VirtualClock,
 )
-from sensors import uwb_dwm1001, uwb_lines, uwb_qm33
-from sensors.fake_serial import fake_serial
-from sensors.serial_port import LONGEST_LINE, Line, LineReader, opening_error
-from sensors.uwb_dwm1001 import FakeShell, UwbDwm1001
-from sensors.uwb_lines import UwbLines
-from sensors.uwb_qm33 import Frames, UwbQm33
+from sensors.uwb import dwm1001 as uwb_dwm1001
+from sensors.uwb import lines as uwb_lines
+from sensors.uwb import qm33 as uwb_qm33
+from sensors.uwb.dwm1001 import FakeShell, UwbDwm1001
+from sensors.uwb.fake_serial import fake_serial
+from sensors.uwb.lines import UwbLines
+from sensors.uwb.qm33 import Frames, UwbQm33
+from sensors.uwb.serial_port import LONGEST_LINE, Line, LineReader, opening_error
 
 
 def heard(driver, wanted, tries=100):

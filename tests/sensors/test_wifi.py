@@ -21,14 +21,14 @@ from fusion.errors import (
     UnsupportedError,
 )
 from fusion.values import WifiScan, nanoseconds, seconds
-from sensors.keeper import Keeper, State
-from sensors.nl80211_fake import INDEX, WIPHY, FakeKernel, three_access_points
-from sensors.nl80211_message import Command, Message, encode
-from sensors.wifi import Wifi
-from sensors.wifi_discovery import discover, discover_ranging, may_scan
-from sensors.wifi_loop import FAILURES_TO_STUCK
-from sensors.wifi_reading import MARGIN_NS
-from sensors.wifi_report import Report, Stamp
+from sensors.onboard.keeper import Keeper, State
+from sensors.wifi.discovery import discover, discover_ranging, may_scan
+from sensors.wifi.loop import FAILURES_TO_STUCK
+from sensors.wifi.nl80211_fake import INDEX, WIPHY, FakeKernel, three_access_points
+from sensors.wifi.nl80211_message import Command, Message, encode
+from sensors.wifi.reading import MARGIN_NS
+from sensors.wifi.report import Report, Stamp
+from sensors.wifi.rssi import Wifi
 
 ONE, TWO, THREE = (f"02:00:00:00:0{k}:00" for k in (1, 2, 3))
 POLL_S = 0.1

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from fusion.errors import DeviceLostError, NotFoundError
-from sensors.wifi_errors import FIRMWARE, PASSING, REFUSALS, lost, refused, stuck
+from sensors.wifi.errors import FIRMWARE, PASSING, REFUSALS, lost, refused, stuck
 
 
 def refusal(code, words=None):

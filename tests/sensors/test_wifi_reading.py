@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sensors.nl80211_message import Command, Message, decode
-from sensors.wifi_reading import (
+from sensors.wifi.nl80211_message import Command, Message, decode
+from sensors.wifi.reading import (
     FRAME_STD_NS,
     Heard,
     Part,

@@ -8,11 +8,11 @@ import pytest
 from fusion.driver import Level, Remark
 from fusion.errors import DeviceLostError, NotPermittedError, SettingError, UnsupportedError
 from fusion.values import Ranges, nanoseconds, seconds
-from sensors.ftm import LIGHT_M_PER_PS, Status, read_attempts, request
-from sensors.nl80211_fake import INDEX, FakeKernel, three_access_points
-from sensors.nl80211_message import Command, Message, encode
-from sensors.wifi_rtt import WifiRtt
-from sensors.wifi_settings import Peer
+from sensors.wifi.ftm import LIGHT_M_PER_PS, Status, read_attempts, request
+from sensors.wifi.nl80211_fake import INDEX, FakeKernel, three_access_points
+from sensors.wifi.nl80211_message import Command, Message, encode
+from sensors.wifi.rtt import WifiRtt
+from sensors.wifi.settings import Peer
 
 ONE, TWO, THREE = three_access_points()
 PEERS = [{"bssid": bssid, "frequency_mhz": ap.frequency_mhz} for bssid, ap in three_access_points().items()]

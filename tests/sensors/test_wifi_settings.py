@@ -4,9 +4,9 @@ import pytest
 
 from fusion.driver import VirtualClock
 from fusion.errors import SettingError
-from sensors.robot_file import Sensor, build_driver
-from sensors.wifi import Wifi
-from sensors.wifi_rtt import WifiRtt
+from sensors.onboard.robot_file import Sensor, build_driver
+from sensors.wifi.rssi import Wifi
+from sensors.wifi.rtt import WifiRtt
 
 BSSID = "02:00:00:00:01:00"
 PEER = {"bssid": BSSID, "frequency_mhz": 2412}

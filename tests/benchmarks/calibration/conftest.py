@@ -8,8 +8,8 @@ import pytest
 
 from fusion import Gyro, RssiReading, Truth, WifiScan, World
 from logs.run import Run, TruthTrack
-from sensors.scenario import Scenario
-from sensors.simulate import simulated_run
+from sensors.simulation.scenario import Scenario
+from sensors.simulation.simulate import simulated_run
 
 ANCHORS = [
     {"id": "a", "position_m": [0.0, 0.0, 2.0]},

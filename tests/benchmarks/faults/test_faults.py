@@ -24,8 +24,8 @@ from fusion.track import order
 from fusion.values import nanoseconds, seconds
 from fusion.world import DRIVES
 from logs.run import Run
-from sensors.scenario import load_scenario
-from sensors.simulate import simulated_run
+from sensors.simulation.scenario import load_scenario
+from sensors.simulation.simulate import simulated_run
 
 OFFICE = load_scenario("office")
 SCENARIO = replace(

@@ -15,8 +15,8 @@ from benchmarks.paper.calibrated import ALTERNATIVES_FILE, calibrated_alternativ
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.variants import without_gyro
 from fusion import FusionError, WifiScan, WorldError
-from sensors.scenario import Scenario, load_scenario, scenario_text
-from sensors.simulate import simulated_run
+from sensors.simulation.scenario import Scenario, load_scenario, scenario_text
+from sensors.simulation.simulate import simulated_run
 
 OFFICE = ENVIRONMENTS[0]
 OBSTRUCTIONS = ALTERNATIVES[-1]

@@ -11,7 +11,7 @@ from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.readings import MISSING_VALUES, ORIGINS_M, READINGS
 from benchmarks.paper.study import effects, literal_of_scale, rank
 from benchmarks.paper.summary import Share, Spread
-from sensors.scenario import load_scenario
+from sensors.simulation.scenario import load_scenario
 
 OFFICE, MEC, ARENA = ENVIRONMENTS
 

@@ -23,8 +23,8 @@ from benchmarks.paper.variants import with_gyro
 from benchmarks.sheet import as_markdown
 from fusion import ParameterError, WorldError
 from fusion.cli import main
-from sensors.scenario import load_scenario
-from sensors.simulate import simulated_run
+from sensors.simulation.scenario import load_scenario
+from sensors.simulation.simulate import simulated_run
 
 
 @pytest.fixture(scope="module")

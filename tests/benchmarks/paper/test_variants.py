@@ -13,8 +13,8 @@ from benchmarks.paper.study import literal_of_scale
 from benchmarks.paper.trial import lane_errors
 from benchmarks.paper.variants import MISSING_SHARE, leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
 from fusion import Gyro, Odometry, WifiScan
-from sensors.scenario import load_scenario
-from sensors.simulate import simulated_run
+from sensors.simulation.scenario import load_scenario
+from sensors.simulation.simulate import simulated_run
 
 SCENARIOS = [environment.scenario for environment in ENVIRONMENTS]
 

@@ -12,7 +12,7 @@ from benchmarks.review.picture import SIZE, headless_viewer, render
 from benchmarks.review.review import review
 from benchmarks.review.viewer import go_to, has_display
 from fusion import FusionError, LogError, PluginError, ViewerError
-from sensors.simulate import simulate
+from sensors.simulation.simulate import simulate
 
 
 @pytest.fixture

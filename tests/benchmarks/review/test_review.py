@@ -9,7 +9,7 @@ import pytest
 from benchmarks.review.review import review
 from fusion import ParameterError
 from fusion.cli import main
-from sensors.simulate import simulate
+from sensors.simulation.simulate import simulate
 
 
 @pytest.fixture(scope="module")

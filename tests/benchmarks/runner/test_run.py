@@ -26,7 +26,7 @@ from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store
 from fusion import FusionError, SuiteError
 from fusion.cli import main
-from sensors.simulate import simulate
+from sensors.simulation.simulate import simulate
 
 SUITE = """
 [suite]

@@ -11,7 +11,7 @@ from benchmarks.runner.definition import builtin_suites, load_suite
 from benchmarks.runner.plan import contestant_spec, read_faults
 from fusion import SuiteError
 from logs.importing import KINDS
-from sensors.scenario import builtin_names
+from sensors.simulation.scenario import builtin_names
 
 SUITES = Path(definition.__file__).parents[1] / "suites"
 CATALOGUE = tomllib.loads((SUITES / "catalogue.toml").read_text(encoding="utf-8"))

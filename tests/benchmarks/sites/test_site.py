@@ -12,8 +12,8 @@ from benchmarks.sites.site_report import gain_m, record, sheets
 from benchmarks.sites.site_source import choose_radio, load_site
 from fusion import LogError, ParameterError, WorldError
 from fusion.cli import main
-from sensors.scenario import load_scenario, scenario_text
-from sensors.simulate import simulate
+from sensors.simulation.scenario import load_scenario, scenario_text
+from sensors.simulation.simulate import simulate
 
 HALL = """
 name = "hall"

@@ -18,8 +18,8 @@ from kernel.guest.gpio import SimulatedGpio
 from kernel.guest.gyro import StubMpu6050
 from kernel.guest.serial import FAR, UsbSerial, raw
 from kernel.guest.world import Air
-from sensors.channel import Channel
-from sensors.scenario import Scenario
+from sensors.simulation.channel import Channel
+from sensors.simulation.scenario import Scenario
 
 WHEELS = ["front left", "front right", "rear left", "rear right"]
 STEPS_PER_RAD_S = 131.0 * math.degrees(1.0)

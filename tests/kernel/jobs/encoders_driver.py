@@ -8,7 +8,7 @@ from typing import Any
 
 from fusion import BootClock, DriverError, Remark, Said, WheelTicks
 from kernel.guest.gpio import SimulatedGpio
-from sensors.encoders import Encoders
+from sensors.wheels.encoders import Encoders
 
 NAMES = ["front left", "front right", "rear left", "rear right"]
 

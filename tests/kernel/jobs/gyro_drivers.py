@@ -6,9 +6,9 @@ from typing import Any
 
 from fusion import BootClock, DriverError, Gyro
 from kernel.guest.gyro import StubMpu6050
-from sensors.gyro_iio import GyroIio
-from sensors.gyro_mpu6050 import GyroMpu6050
-from sensors.gyro_sampling import SampledGyro
+from sensors.gyro.iio import GyroIio
+from sensors.gyro.mpu6050 import GyroMpu6050
+from sensors.gyro.sampling import SampledGyro
 
 Counts = tuple[int, int, int]
 

@@ -16,8 +16,8 @@ from kernel.guest.recorder import Recorder
 from kernel.guest.robot import Robot, SimulatedAir
 from kernel.guest.runner import SHARE
 from kernel.guest.system import set_link, wait_until
-from sensors.scenario import Scenario, load_scenario
-from sensors.simulated import SimulatedRobot
+from sensors.simulation.robot import SimulatedRobot
+from sensors.simulation.scenario import Scenario, load_scenario
 
 ROBOT_FILE = Path(__file__).parents[1] / "robot.toml"
 WAYPOINTS_M = ((1.0, 1.0), (4.0, 1.0), (4.0, 3.0), (1.0, 3.0), (1.0, 1.0))

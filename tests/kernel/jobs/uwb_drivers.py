@@ -7,11 +7,11 @@ from typing import Any
 
 from fusion import BootClock, NotFoundError, Ranges, Remark, Said
 from kernel.guest.serial import NEAR, Module, UsbSerial
-from sensors.fake_serial import Mute, Talker
-from sensors.keeper import Keeper
-from sensors.uwb_dwm1001 import FakeShell, UwbDwm1001
-from sensors.uwb_lines import UwbLines
-from sensors.uwb_serial import SerialRanging
+from sensors.onboard.keeper import Keeper
+from sensors.uwb.dwm1001 import FakeShell, UwbDwm1001
+from sensors.uwb.fake_serial import Mute, Talker
+from sensors.uwb.lines import UwbLines
+from sensors.uwb.serial_ranging import SerialRanging
 
 ENOUGH = 5
 """Ranges before and after."""

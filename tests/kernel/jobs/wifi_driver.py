@@ -15,7 +15,7 @@ from kernel.guest.nobody import Nobody
 from kernel.guest.radios import FREQUENCIES_MHZ, access_points, air_with_radios
 from kernel.guest.system import set_link
 from kernel.guest.world import Air, Point
-from sensors.wifi import Wifi
+from sensors.wifi.rssi import Wifi
 
 ALL_CHANNELS_MHZ = tuple(range(2412, 2473, 5))
 CLOCK = BootClock()

@@ -12,7 +12,7 @@ from kernel.guest.netlink import Family, attribute
 from kernel.guest.radios import FREQUENCIES_MHZ, air_with_radios
 from kernel.guest.system import set_link
 from kernel.guest.world import Air, Point
-from sensors.wifi_rtt import WifiRtt
+from sensors.wifi.rtt import WifiRtt
 
 POLL_S = 0.2
 POLLS = 300

@@ -1,0 +1,137 @@
+"""What UWB modules on a serial port have in common: a port, lines, ranges with the names of anchors.
+
+A reading that cannot be understood costs that reading, a line that cannot be understood that line; both are told, and
+counted. The device's own position and its failures are remarks: no estimator sees them, the log keeps them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import ClassVar, NamedTuple
+
+from fusion import Clock, DeviceInfo, DriverSpec, Found, Level, RangeReading, Ranges, Remark, Said, SettingError
+from sensors.uwb.serial_port import NEEDS, Line, LineReader, SerialPort, find_ports
+
+LONGEST_RANGE_M = 1000.0
+"""No UWB module reaches farther: a larger number is a number gone wrong."""
+NONE: Mapping[str, str] = MappingProxyType({})
+
+
+class Heard(NamedTuple):
+    """What one line, or one notification, says: ranges [m] by the device's own names of anchors."""
+
+    ranges: tuple[tuple[str, float, float | None], ...] = ()
+    """Name, range [m], and its standard deviation [m] where the device claims one."""
+    refused: int = 0
+    """Readings in it that cannot be understood."""
+    values: tuple[tuple[str, str], ...] = ()
+    """What else it says: its own position, failures."""
+
+
+def sound_range(text: str, unit_m: float = 1.0) -> float | None:
+    """A range [m] from its text, None where it is none that can be.
+
+    >>> sound_range("1.25"), sound_range("29", 0.01), sound_range("-1"), sound_range("nan"), sound_range("x")
+    (1.25, 0.29, None, None, None)
+    """
+    try:
+        range_m = float(text) * unit_m
+    except ValueError:
+        return None
+    return range_m if math.isfinite(range_m) and 0.0 <= range_m <= LONGEST_RANGE_M else None
+
+
+class SerialRanging:
+    """A UWB module on a serial port; one of the drivers that derive from this is meant.
+
+    ``names`` gives a device's name of an anchor the world's; a name that is not in it stays as it is. ``start`` is a
+    line sent to the module when it is opened, for a firmware that waits to be told. ``std_m`` stands for the standard
+    deviation that the device does not claim.
+    """
+
+    summary: ClassVar[str]
+    model: ClassVar[str]
+
+    def __init__(
+        self,
+        name: str,
+        clock: Clock,
+        *,
+        port: str,
+        baudrate: int = 115200,
+        hz: float = 10.0,
+        least_hz: float = 1.0,
+        std_m: float | None = None,
+        names: Mapping[str, str] = NONE,
+        start: str = "",
+    ) -> None:
+        if not hz >= least_hz > 0.0:
+            raise SettingError(f"{name}: hz = {hz}, least_hz = {least_hz}", "give hz >= least_hz > 0")
+        if std_m is not None and not std_m > 0.0:
+            raise SettingError(f"{name}: std_m = {std_m}", "give a positive standard deviation [m], or leave it out")
+        self._name, self._clock = name, clock
+        self._port = SerialPort(port, baudrate)
+        self._names, self._std_m, self._start = dict(names), std_m, start
+        self._lines = LineReader(clock)
+        self._seq = 0
+        self._overlong = 0
+        self.spec = DriverSpec((Ranges,), hz, least_hz, NEEDS)
+
+    @classmethod
+    def discover(cls) -> list[Found]:
+        """Serial ports on USB: which module is behind one shows when it is opened."""
+        return find_ports()
+
+    def open(self) -> DeviceInfo:
+        """Open the port and have the module report; leaves the port closed where it does not."""
+        self._port.open()
+        self._lines = LineReader(self._clock)
+        self._overlong = 0
+        try:
+            firmware = self._begin()
+        except BaseException:
+            self.close()
+            raise
+        settings = {"port": self._port.path, "baudrate": self._port.baudrate}
+        return DeviceInfo(self.model, firmware=firmware, settings=settings)
+
+    def poll(self, timeout_s: float) -> Sequence[Said]:
+        """What came."""
+        said = [one for line in self._lines.feed(self._port.read(timeout_s)) for one in self._said(line)]
+        if self._lines.overlong > self._overlong:
+            self._overlong = self._lines.overlong
+            said.append(self._remark(self._clock.now_ns(), "a line without an end was dropped"))
+        return said
+
+    def close(self) -> None:
+        """Let go of the port. The module goes on reporting."""
+        self._port.close()
+
+    def _begin(self) -> str:
+        """Have the module report; answers its firmware, where it says so."""
+        if self._start:
+            self._port.write(self._start.encode() + b"\r\n")
+        return ""
+
+    def _hear(self, line: Line) -> Iterator[tuple[int, Heard]]:
+        """What a line says, and when that was true [ns]."""
+        raise NotImplementedError
+
+    def _said(self, line: Line) -> Iterator[Said]:
+        for time_ns, heard in self._hear(line):
+            if heard.ranges:
+                self._seq += 1
+                readings = tuple(
+                    RangeReading(self._names.get(anchor, anchor), range_m, self._std_m if std_m is None else std_m)
+                    for anchor, range_m, std_m in heard.ranges
+                )
+                yield Ranges(time_ns, self._name, self._seq, readings)
+            if heard.values:
+                yield Remark(time_ns, self._name, Level.OK, "told beside the ranges", heard.values)
+            if heard.refused:
+                yield self._remark(time_ns, f"{heard.refused} readings cannot be understood", line.text)
+
+    def _remark(self, time_ns: int, text: str, line: str = "") -> Remark:
+        return Remark(time_ns, self._name, Level.WARN, text, (("line", line[:200]),) if line else ())
