@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from fusion.errors import PluginError
@@ -48,8 +49,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """List what is installed."""
-    entries = installed()
-    sys.stdout.write(
-        json.dumps(entries, indent=2, default=str) + "\n" if arguments.json else "".join(map(_text, entries))
-    )
+    show(installed(), _text, as_json=arguments.json)
     return 0
+
+
+def show(entries: Sequence[Mapping[str, Any]], text: Callable[[Any], str], *, as_json: bool) -> None:
+    """What is installed, on stdout: a line or more each by ``text``, or one JSON list."""
+    told = json.dumps(entries, indent=2, default=str) + "\n" if as_json else "".join(map(text, entries))
+    sys.stdout.write(told)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 from typing import Any
 
 from fusion import FusionError, load, names
+from fusion.listing import show
 from fusion.plugins import SENSORS
 
 
@@ -41,8 +40,5 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """List drivers and devices."""
-    entries = drivers()
-    sys.stdout.write(
-        json.dumps(entries, indent=2, default=str) + "\n" if arguments.json else "".join(map(_text, entries))
-    )
+    show(drivers(), _text, as_json=arguments.json)
     return 0

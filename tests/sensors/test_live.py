@@ -33,7 +33,6 @@ from sensors.onboard import split_log
 from sensors.onboard.keeper import State
 from sensors.onboard.live import Now, live
 from sensors.onboard.live_verb import describe, record
-from sensors.onboard.robot_file import RobotFile
 from tests.sensors.robot_files import robot_text
 
 
@@ -90,16 +89,6 @@ def _estimators():
         fusion.registered("has_no_message", HasNoMessage),
     ):
         yield
-
-
-@pytest.fixture
-def robot(tmp_path):
-    def write(**options):
-        path = tmp_path / "trolley.toml"
-        path.write_text(robot_text(**options))
-        return RobotFile.load(path)
-
-    return write
 
 
 def lived(robot, estimator, duration_s, **options):

@@ -21,20 +21,9 @@ from logs.joining import join
 from logs.reader import read_run
 from sensors.onboard import split_log
 from sensors.onboard.recording import record
-from sensors.onboard.robot_file import RobotFile
 from tests.sensors.robot_files import robot_text
 
 LOST_AT_MOST_S = 1.2
-
-
-@pytest.fixture
-def robot(tmp_path):
-    def write(**options):
-        path = tmp_path / "trolley.toml"
-        path.write_text(robot_text(**options))
-        return RobotFile.load(path)
-
-    return write
 
 
 def recorded(robot, folder, duration_s, **options):
