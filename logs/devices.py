@@ -51,7 +51,12 @@ def devices(remarks: Sequence[Remark]) -> dict[str, dict[str, str]]:
 def complaints(remarks: Sequence[Remark]) -> list[tuple[str, int]]:
     """What went wrong with sensors, most frequent first, with its count; the states told each second are left out."""
     bad = (r for r in remarks if r.level is not Level.OK and r.text != STATUS)
-    return Counter(f"{remark.sensor}: {remark.text}" for remark in bad).most_common(MOST_TOLD)
+    return Counter(map(as_line, bad)).most_common(MOST_TOLD)
+
+
+def as_line(remark: Remark) -> str:
+    """A remark with the name of its sensor, which errors of drivers say by themselves."""
+    return remark.text if remark.text.startswith(remark.sensor) else f"{remark.sensor}: {remark.text}"
 
 
 def dropped(remarks: Sequence[Remark]) -> dict[str, int]:

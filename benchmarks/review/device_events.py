@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.review.canvas import Canvas
 from fusion import Level, Remark
-from logs.devices import OPENED, STATUS
+from logs.devices import OPENED, STATUS, as_line
 from logs.run import Run
 
 DEVICES = "devices"
@@ -24,5 +24,5 @@ def draw_device_events(canvas: Canvas, remarks: Sequence[Remark]) -> None:
     """A line for each; nothing for a run without."""
     if remarks:
         time_ns = np.array([remark.time_ns for remark in remarks], dtype=np.int64)
-        text = [f"{remark.sensor}: {remark.text}" for remark in remarks]
-        canvas.text(["events", DEVICES], time_ns, [LEVELS[remark.level] for remark in remarks], text)
+        levels = [LEVELS[remark.level] for remark in remarks]
+        canvas.text(["events", DEVICES], time_ns, levels, [as_line(remark) for remark in remarks])

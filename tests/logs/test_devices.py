@@ -37,7 +37,7 @@ def test_devices_complaints_and_drops_are_counted():
     remarks = [
         Remark(1, "gyro", Level.OK, "opened", (("model", "MPU-6050"),)),
         Remark(2, "gyro", Level.WARN, "gone"),
-        Remark(3, "gyro", Level.WARN, "gone"),
+        Remark(3, "gyro", Level.WARN, "gyro: gone"),
         Remark(4, "gyro", Level.OK, "back"),
         status(0),
         status(7),
