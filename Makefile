@@ -3,14 +3,23 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+EVO := .venv-evo
 
-.PHONY: demo test test-kernel kernel-parts lint clean
+.PHONY: demo test test-evo test-kernel kernel-parts lint clean
 
 demo: $(READY)
 	$(BIN)/fusion demo --output fusion-demo
 
 test: $(READY)
 	$(BIN)/python -m pytest -q -n auto
+
+# Scores agree with evo's to 1e-9. It is GPL: a program of its own in an environment of its own, never imported.
+test-evo: $(READY) $(EVO)/bin/evo_ape
+	PATH="$(CURDIR)/$(EVO)/bin:$$PATH" $(BIN)/python -m pytest -q tests/benchmarks/metrics/test_against_evo.py
+
+$(EVO)/bin/evo_ape:
+	$(PYTHON) -m venv $(EVO)
+	$(EVO)/bin/python -m pip install --quiet --disable-pip-version-check evo==1.38.0
 
 # The real drivers of a real kernel, emulated: docs/kernel-tier.md.
 test-kernel: kernel-parts
@@ -33,4 +42,4 @@ $(READY): pyproject.toml .ci/constraints.txt
 	touch $@
 
 clean:
-	rm -rf $(VENV) fusion-demo build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(EVO) fusion-demo build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
