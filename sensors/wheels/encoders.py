@@ -11,15 +11,12 @@ from __future__ import annotations
 import errno
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from datetime import timedelta
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import ClassVar
 
 from fusion import (
-    BootClock,
     Clock,
-    DependencyError,
     DeviceInfo,
     DeviceLostError,
     DriverSpec,
@@ -32,70 +29,10 @@ from fusion import (
 )
 from fusion.values import WheelTicks, nanoseconds, seconds
 from sensors.device_errors import device_error
+from sensors.wheels.fake_lines import FakeLines
+from sensors.wheels.gpio_lines import GpioLines, Lines
 
 CHIPS = "/dev/gpiochip*"
-BUFFER = 1024
-"""Edges the kernel keeps for us, its greatest number: five seconds at a metre a second with 20 ticks a turn."""
-CONSUMER = "fusion"
-
-
-class Edge(NamedTuple):
-    """One edge: the line it was seen on, and its number on that line since the lines were requested, from 1."""
-
-    line: int
-    number: int
-
-
-class Lines(Protocol):
-    """The device: what the driver needs of a GPIO chip. `GpioLines` is the real one, `FakeLines` the other."""
-
-    model: str
-
-    def open(self, chip: str, lines: Sequence[int], debounce_s: float) -> None:
-        """Ask for rising edges on ``lines``; raises OSError."""
-
-    def wait(self, timeout_s: float) -> bool:
-        """Whether there is something to read, waiting at most so long for it."""
-
-    def read(self) -> list[Edge]:
-        """All that was seen and not read; raises OSError when the chip is gone."""
-
-    def close(self) -> None:
-        """Let go."""
-
-
-class GpioLines:
-    """Lines of a GPIO chip by libgpiod."""
-
-    model = "GPIO lines"
-
-    def __init__(self) -> None:
-        self._request: Any = None
-
-    def open(self, chip: str, lines: Sequence[int], debounce_s: float) -> None:
-        """Ask for them; raises OSError, or `DependencyError`."""
-        try:
-            import gpiod
-        except ImportError as error:
-            hint = 'python3 -m pip install "fusion-localization[sensors]"'
-            raise DependencyError("the package gpiod is missing", hint) from error
-        period = timedelta(seconds=debounce_s)
-        settings = gpiod.LineSettings(edge_detection=gpiod.line.Edge.RISING, debounce_period=period)
-        self._request = gpiod.request_lines(chip, {tuple(lines): settings}, CONSUMER, event_buffer_size=BUFFER)
-
-    def wait(self, timeout_s: float) -> bool:
-        """Whether there is something to read."""
-        return bool(self._request.wait_edge_events(timeout_s))
-
-    def read(self) -> list[Edge]:
-        """All that was seen and not read: left to itself the library would hand out 64 edges at a time."""
-        return [Edge(event.line_offset, event.line_seqno) for event in self._request.read_edge_events(BUFFER)]
-
-    def close(self) -> None:
-        """Let go."""
-        request, self._request = self._request, None
-        if request is not None:
-            request.release()
 
 
 class Encoders:
@@ -210,64 +147,3 @@ class Encoders:
         absent = "`fusion sensors` lists the chips that are there"
         busy = "`gpioinfo` names who has the lines; stop that one"
         return device_error(f"{self._name}: {self._chip}", error, group="gpio", absent=absent, busy=busy)
-
-
-class FakeLines:
-    """A chip with two lines: the device of `GpioLines` and, for the kit, the wheels that turn in front of it."""
-
-    model = "fake lines"
-
-    def __init__(self) -> None:
-        self.clock = BootClock()
-        self.settings = {"lines": (17, 27), "chip": "/dev/fake", "device": lambda: self}
-        self._is_there = True
-        self._numbers: dict[int, int] = {}
-        self._edges: list[Edge] = []
-
-    def turn(self, ticks: int) -> None:
-        """Both wheels roll on by so many ticks; what nobody reads is lost but for the last `BUFFER` edges."""
-        for _ in range(ticks):
-            for line in self._numbers:
-                self._numbers[line] += 1
-                self._edges.append(Edge(line, self._numbers[line]))
-        del self._edges[:-BUFFER]
-
-    def speak(self) -> None:
-        """Turn by a few ticks; the next report tells."""
-        self.turn(3)
-
-    def garble(self) -> None:
-        """Turn so fast that edges are lost on the way."""
-        self.turn(2 * BUFFER)
-
-    def unplug(self) -> None:
-        """Take the chip away."""
-        self._is_there = False
-
-    def plug(self) -> None:
-        """Give it back."""
-        self._is_there = True
-
-    def open(self, chip: str, lines: Sequence[int], _debounce_s: float) -> None:
-        """As the kernel does: numbers begin at 1 with each request."""
-        if not self._is_there:
-            raise OSError(errno.ENOENT, "No such file or directory", chip)
-        self._numbers = dict.fromkeys(lines, 0)
-        self._edges = []
-
-    def wait(self, timeout_s: float) -> bool:
-        """As the kernel does: a chip that is gone is always ready, and reading tells why."""
-        if not self._edges and self._is_there:
-            self.clock.sleep(timeout_s)
-        return bool(self._edges) or not self._is_there
-
-    def read(self) -> list[Edge]:
-        """What was seen."""
-        if not self._is_there:
-            raise OSError(errno.ENODEV, "No such device")
-        edges, self._edges = self._edges, []
-        return edges
-
-    def close(self) -> None:
-        """Let go."""
-        self._edges = []

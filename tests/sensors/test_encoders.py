@@ -18,7 +18,9 @@ from fusion import (
     WheelTicks,
 )
 from fusion.values import seconds
-from sensors.wheels.encoders import BUFFER, Edge, Encoders, FakeLines
+from sensors.wheels.encoders import Encoders
+from sensors.wheels.fake_lines import FakeLines
+from sensors.wheels.gpio_lines import BUFFER, Edge
 
 
 @pytest.fixture
