@@ -4,11 +4,26 @@ from __future__ import annotations
 
 import errno
 
-from fusion import BusyError, DeviceLostError, DriverError, NotFoundError, NotPermittedError, UnsupportedError
+from fusion import (
+    BusyError,
+    DependencyError,
+    DeviceLostError,
+    DriverError,
+    NotFoundError,
+    NotPermittedError,
+    UnsupportedError,
+)
 
 ABSENT = (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EREMOTEIO)
 """No such file, no such device, or nobody at that address of the bus (EREMOTEIO; ENXIO on some adapters)."""
 DENIED = (errno.EACCES, errno.EPERM)
+INSTALL = 'python3 -m pip install "fusion-localization[sensors]"'
+"""What brings in the packages that drivers need."""
+
+
+def missing_package(name: str) -> DependencyError:
+    """The error of a driver whose package ``name`` is not installed."""
+    return DependencyError(f"the package {name} is missing", INSTALL)
 
 
 def device_error(what: str, error: OSError, *, group: str, absent: str, busy: str) -> DriverError:

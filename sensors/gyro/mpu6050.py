@@ -18,7 +18,6 @@ from typing import Any, ClassVar, Protocol
 from fusion import (
     BootClock,
     Clock,
-    DependencyError,
     DeviceLostError,
     DriverError,
     Found,
@@ -26,7 +25,7 @@ from fusion import (
     ProtocolError,
     SettingError,
 )
-from sensors.device_errors import device_error
+from sensors.device_errors import device_error, missing_package
 from sensors.gyro.sampling import Sample, SampledGyro, UnreadableError
 
 WHO_AM_I, POWER, RATE_DIVIDER, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, FIRST_SAMPLE = (
@@ -88,8 +87,7 @@ def _open_bus(number: int) -> Bus:
     try:
         import smbus2
     except ImportError as error:
-        hint = 'python3 -m pip install "fusion-localization[sensors]"'
-        raise DependencyError("the package smbus2 is missing", hint) from error
+        raise missing_package("smbus2") from error
     bus: Any = smbus2.SMBus(number)
     return bus  # type: ignore[no-any-return]  # it has those three methods
 

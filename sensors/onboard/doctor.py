@@ -18,6 +18,7 @@ from pathlib import Path
 
 from fusion import Advice, BootClock, Driver, FusionError, LogError
 from fusion.driver import Needs
+from sensors.device_errors import INSTALL
 from sensors.onboard.computer import is_clock_synced
 from sensors.onboard.robot_file import RobotFile, Sensor, build_driver
 from sensors.onboard.split_log import check_space
@@ -53,8 +54,7 @@ def _sensor(sensor: Sensor) -> Iterator[Advice]:
 def _needs(name: str, needs: Needs) -> Iterator[Advice]:
     for module in needs.modules:
         there = importlib.util.find_spec(module) is not None
-        cure = 'python3 -m pip install "fusion-localization[sensors]"'
-        yield Advice(there, f"{name}: the package {module} is {'there' if there else 'missing'}", cure)
+        yield Advice(there, f"{name}: the package {module} is {'there' if there else 'missing'}", INSTALL)
     for capability in needs.capabilities:
         held = holds_capability(capability)
         word = capability.removeprefix("CAP_").lower()

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from fusion import Clock, DependencyError, DeviceLostError, DriverError, Found, Needs, NotFoundError
-from sensors.device_errors import device_error
+from fusion import Clock, DeviceLostError, DriverError, Found, Needs, NotFoundError
+from sensors.device_errors import device_error, missing_package
 
 NEEDS = Needs(groups=("dialout",), modules=("serialx",))
 CHUNK = 4096
@@ -33,8 +33,7 @@ class SerialPort:
         try:
             import serialx
         except ImportError as error:
-            hint = 'python3 -m pip install "fusion-localization[sensors]"'
-            raise DependencyError("the package serialx is missing", hint) from error
+            raise missing_package("serialx") from error
         try:
             port = serialx.serial_for_url(self.path, baudrate=self.baudrate, read_timeout=0, exclusive=True)
             port.open()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from datetime import timedelta
 from typing import Any, NamedTuple, Protocol
 
-from fusion import DependencyError
+from sensors.device_errors import missing_package
 
 BUFFER = 1024
 """Edges the kernel keeps for us, its greatest number: five seconds at a metre a second with 20 ticks a turn."""
@@ -51,8 +51,7 @@ class GpioLines:
         try:
             import gpiod
         except ImportError as error:
-            hint = 'python3 -m pip install "fusion-localization[sensors]"'
-            raise DependencyError("the package gpiod is missing", hint) from error
+            raise missing_package("gpiod") from error
         period = timedelta(seconds=debounce_s)
         settings = gpiod.LineSettings(edge_detection=gpiod.line.Edge.RISING, debounce_period=period)
         self._request = gpiod.request_lines(chip, {tuple(lines): settings}, CONSUMER, event_buffer_size=BUFFER)

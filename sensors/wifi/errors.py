@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 from fusion.errors import (
     BusyError,
-    DependencyError,
     DeviceLostError,
     DriverError,
     NotFoundError,
@@ -20,6 +19,7 @@ from fusion.errors import (
     SettingError,
     UnsupportedError,
 )
+from sensors.device_errors import missing_package
 
 NETWORK_MANAGER = "NetworkManager scans by itself: `nmcli dev set {interface} managed no`, or a second USB radio"
 CAPABILITY = (
@@ -91,4 +91,4 @@ def stuck(interface: str, driver: str, failures: int, last: str) -> DriverError:
 def require_pyroute2() -> None:
     """Raises `DependencyError` where it is not installed."""
     if importlib.util.find_spec("pyroute2") is None:
-        raise DependencyError("Wi-Fi drivers need pyroute2", "pip install 'fusion-localization[sensors]'")
+        raise missing_package("pyroute2")

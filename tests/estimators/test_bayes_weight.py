@@ -172,7 +172,7 @@ def test_heading_is_corrected_through_its_covariance_with_the_position():
     assert after.covariance.hh < 0.5 * before.covariance.hh
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(derandomize=True, max_examples=100)
 @given(
     root=st.lists(st.floats(-2, 2), min_size=9, max_size=9),
     place=st.tuples(st.floats(-100, 100), st.floats(-100, 100)),

@@ -123,7 +123,7 @@ def stream(stamps, delays, numbers=None):
     return Stream(stamps, arrivals, np.arange(len(stamps)) if numbers is None else np.array(numbers))
 
 
-@settings(derandomize=True, deadline=None)
+@settings(derandomize=True)
 @given(st.integers(2 * JUMP_MESSAGES, 60), st.lists(st.integers(0, JUMP_NS // 2), min_size=60, max_size=60))
 def test_regular_stream_with_any_small_delay_has_nothing_odd(count, delays):
     timing = stream([i * SECOND for i in range(count)], delays[:count]).timing(0)
@@ -132,7 +132,7 @@ def test_regular_stream_with_any_small_delay_has_nothing_odd(count, delays):
     assert timing["latest_s"] == max(delays[:count]) / SECOND
 
 
-@settings(derandomize=True, deadline=None)
+@settings(derandomize=True)
 @given(
     st.integers(4 + JUMP_MESSAGES, 50),
     st.sampled_from([-3600.0, -5.0, -0.2, 0.2, 5.0, 1e6]),

@@ -509,7 +509,7 @@ def heal(kernel):
     kernel.refusals.clear()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.data())
 def test_whatever_happens_nothing_stale_is_shown_as_fresh(data):
     """Trouble comes in any order; every reading lies in its scan's window and has a strength of that time."""

@@ -68,7 +68,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(drive):
     assert np.mean(held) >= 0.87
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(turned=st.floats(-3.0, 3.0), moved=st.floats(-50.0, 50.0))
 def test_turning_and_moving_the_floor_changes_nothing(drive, turned, moved):
     run = drive(distance_scale_bias=0.03)

@@ -85,7 +85,7 @@ def test_a_tenth_of_wild_readings_moves_little(rssi_run):
     assert abs(spoiled - clean) < 0.1
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(turned=st.floats(-3.0, 3.0))
 def test_turning_the_floor_changes_nothing(rssi_run, turned):
     points = floor(4, 20)

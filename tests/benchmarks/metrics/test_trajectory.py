@@ -27,7 +27,7 @@ def straight(instants_of, answers_of):
     return run
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(derandomize=True, max_examples=60)
 @given(POSES, POSES)
 def test_relative_error_is_that_of_the_definition(instants_of, answers_of, true, said):
     columns = [np.array(column) for column in zip(*true, strict=True)]

@@ -28,7 +28,7 @@ def test_letters_go_on_after_z():
     assert letters(names, list(itertools.combinations(names, 2)))["27"] == "bb"
 
 
-@settings(derandomize=True, deadline=None)
+@settings(derandomize=True)
 @given(st.sets(st.sampled_from(PAIRS)))
 def test_two_names_share_a_letter_exactly_when_they_are_not_apart(apart):
     given_letters = letters(NAMES, sorted(apart))

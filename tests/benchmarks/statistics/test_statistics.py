@@ -134,7 +134,7 @@ def test_friedman_is_that_of_scipy_with_and_without_ties():
     assert friedman_p(np.ones((5, 3))) == 1.0
 
 
-@settings(derandomize=True, deadline=None)
+@settings(derandomize=True)
 @given(st.lists(st.integers(-20, 20), min_size=1, max_size=9))
 def test_turning_all_differences_round_turns_the_sum_and_keeps_p(differences):
     values = np.array(differences, dtype=float)

@@ -156,7 +156,7 @@ run_scores = st.one_of(st.floats(0.01, 100.0), st.just(math.inf))
 paired = st.lists(st.tuples(run_scores, run_scores), min_size=1, max_size=9)
 
 
-@settings(derandomize=True, deadline=None)
+@settings(derandomize=True)
 @given(paired)
 def test_swapping_the_two_inverts_the_ratio_and_keeps_the_winner(pairs):
     first, second = (np.array(column)[:, None] for column in zip(*pairs, strict=True))
@@ -169,7 +169,7 @@ def test_swapping_the_two_inverts_the_ratio_and_keeps_the_winner(pairs):
     )
 
 
-@settings(derandomize=True, deadline=None)
+@settings(derandomize=True)
 @given(paired, st.sampled_from([0.01, 100.0, 57.3]))
 def test_unit_of_the_scores_changes_nothing(pairs, unit):
     first, second = (np.array(column)[:, None] for column in zip(*pairs, strict=True))
