@@ -14,7 +14,7 @@ from fusion.track import Key
 from logs.device_messages import ClockSync
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TruthTrack:
     """Ground truth as columns of one length n, in time order: time [ns], x, y [m], heading [rad] (NaN: not known)."""
 

@@ -14,7 +14,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from benchmarks.calibration.segments import GAP_S
-from benchmarks.metrics.instants import Instants, interpolate_truth, known_truth
+from benchmarks.metrics.course import Instants
+from benchmarks.metrics.instants import interpolate_truth, known_truth
 from benchmarks.metrics.track import Flags, Floats, Whole
 from fusion import LogError, Pose, Ranges, RssiReading, WifiScan, World
 from fusion.radio import DistanceModel

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.calibration.wheels import Wheels
-from benchmarks.metrics.instants import Instants, evaluation_instants
+from benchmarks.metrics.course import Instants
+from benchmarks.metrics.instants import evaluation_instants
 from benchmarks.metrics.track import Floats, Whole
 from fusion import LogError
 from fusion.values import nanoseconds

@@ -18,7 +18,8 @@ import numpy as np
 from benchmarks.calibration.arcs import Roll, arc_end
 from benchmarks.calibration.segments import GAP_S, STRAIGHT, Segment
 from benchmarks.calibration.wheels import Wheels
-from benchmarks.metrics.instants import Instants, interpolate_truth, known_truth
+from benchmarks.metrics.course import Instants
+from benchmarks.metrics.instants import interpolate_truth, known_truth
 from benchmarks.metrics.track import Floats
 from fusion import Pose, wrap_angle
 from logs.run import Run

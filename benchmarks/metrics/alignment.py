@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.metrics.instants import Answers, Instants
+from benchmarks.metrics.course import Instants
+from benchmarks.metrics.instants import Answers
 from fusion import ParameterError, Pose
 from fusion.errors import did_you_mean
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 
 import numpy as np
@@ -20,8 +19,9 @@ def drift_metrics(measured: Errors) -> dict[str, float]:
     """``eag`` [m/s], the error accumulation gradient of the PDR benchmarks: the slope of the position error over the
     time since the last absolute fix that was used; NaN where no fixes are known.
     """
-    known = np.isfinite(measured.since_fix_s) & np.isfinite(measured.position)
-    return {"eag": theil_sen(measured.since_fix_s[known], measured.position[known])}
+    since_fix_s, position = measured.since_fix_s, measured.position
+    known = np.isfinite(since_fix_s + position)
+    return {"eag": theil_sen(since_fix_s, position) if known.all() else theil_sen(since_fix_s[known], position[known])}
 
 
 def theil_sen(at: Floats, values: Floats) -> float:
@@ -29,11 +29,11 @@ def theil_sen(at: Floats, values: Floats) -> float:
     one place left out; NaN without a pair. Exact up to 77 points, beyond that of evenly spread pairs.
     """
     first, second = pairs_of(len(at))
-    run = at[second] - at[first]
+    run, rise = at.take(second) - at.take(first), values.take(second) - values.take(first)
     apart = run != 0.0
-    if not apart.any():
-        return math.nan
-    return quantile((values[second] - values[first])[apart] / run[apart], 0.5)
+    if not apart.all():
+        run, rise = run[apart], rise[apart]
+    return quantile(rise / run, 0.5)
 
 
 @lru_cache(maxsize=64)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -34,17 +35,22 @@ class Stretches(NamedTuple):
 
     def lasting(self, time_ns: Whole, least_s: float) -> Stretches:
         """Those that last ``least_s`` or longer."""
+        if len(self.first) == 0:
+            return self
         long = time_ns[self.last] - time_ns[self.first] >= nanoseconds(least_s)
         return Stretches(self.first[long], self.last[long])
 
 
-def stretches(mask: Flags, run: Whole) -> Stretches:
-    """The longest stretches of instants where ``mask`` (n,) is True, none reaching over two runs."""
-    if len(mask) == 0 or not mask.any():
-        return Stretches(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
-    if mask.all() and run[0] == run[-1]:
-        return Stretches(np.array([0]), np.array([len(mask) - 1]))
-    breaks = np.flatnonzero((mask[1:] != mask[:-1]) | (run[1:] != run[:-1])) + 1
+NONE = Stretches(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+
+
+def stretches(mask: Flags, starts: Sequence[int] = (0,)) -> Stretches:
+    """The longest stretches of instants where ``mask`` (n,) is True, none reaching over ``starts`` of runs."""
+    changed = mask[1:] != mask[:-1]
+    changed[[start - 1 for start in starts[1:]]] = True
+    breaks = changed.nonzero()[0] + 1
+    if len(breaks) == 0:
+        return Stretches(np.array([0]), np.array([len(mask) - 1])) if mask[:1].any() else NONE
     first = np.concatenate([[0], breaks])
     last = np.concatenate([breaks - 1, [len(mask) - 1]])
     kept = mask[first]
@@ -61,13 +67,13 @@ def convergence_metrics(measured: Errors) -> dict[str, float]:
 
     Over several runs the Kaplan-Meier median; infinite when half of them never do before they end.
     """
-    held = stretches(measured.position <= CONVERGED_M, measured.run).lasting(measured.time_ns, CONVERGED_S)
-    runs = stretches(np.ones(len(measured.run), dtype=bool), measured.run)
+    instants = measured.instants
+    near = stretches(measured.position <= CONVERGED_M, instants.starts)
+    held = near.lasting(instants.time_ns, CONVERGED_S).first.tolist()
     times, reached = [], []
-    for start, end in zip(runs.first.tolist(), runs.last.tolist(), strict=True):
-        own = held.first[(held.first >= start) & (held.first <= end)]
-        stop = own[0] if len(own) else end
-        times.append(float(measured.time_ns[stop] - measured.time_ns[start]) / NANOSECONDS)
+    for start, beyond in pairwise((*instants.starts, len(instants))) if len(instants) else ():
+        own = [first for first in held if start <= first < beyond]
+        times.append(float(instants.time_ns[own[0] if own else beyond - 1] - instants.time_ns[start]) / NANOSECONDS)
         reached.append(len(own) > 0)
     share = sum(reached) / len(reached) if reached else math.nan
     return {"t_conv": kaplan_meier_median(times, reached), "t_conv_share": share}
@@ -95,7 +101,7 @@ def failure_metrics(measured: Errors) -> dict[str, float]:
     if never; ``max_in_outage`` [m], the greatest error of a valid answer inside it; ``growth`` [m/s], the Theil-Sen
     slope of the error inside it. NaN where there was none.
     """
-    failed = stretches(measured.position > FAILED_M, measured.run).lasting(measured.time_ns, FAILED_S)
+    failed = stretches(measured.position > FAILED_M, measured.instants.starts).lasting(measured.time_ns, FAILED_S)
     ends_ns = measured.time_ns[failed.last]
     spans = zip(failed.first.tolist(), (failed.last + 1).tolist(), ends_ns.tolist(), strict=True)
     return {"failures": float(len(failed.first)), **_worst([_outage(measured, *span) for span in spans])}
@@ -147,9 +153,9 @@ def _outage(measured: Errors, first: int, beyond: int, end_ns: int | None) -> Ou
 
 def _recovery_s(measured: Errors, beyond: int, end_ns: int) -> float:
     """From ``end_ns`` until converged, sought from the instant ``beyond`` to the end of its run; infinite if never."""
-    rest = slice(beyond, beyond + int(np.count_nonzero(measured.run[beyond:] == measured.run[beyond - 1])))
+    rest = slice(beyond, measured.instants.end_of_run(beyond - 1))
     rest_ns = measured.time_ns[rest]
-    held = stretches(measured.position[rest] <= CONVERGED_M, measured.run[rest]).lasting(rest_ns, CONVERGED_S)
+    held = stretches(measured.position[rest] <= CONVERGED_M).lasting(rest_ns, CONVERGED_S)
     return float(rest_ns[held.first[0]] - end_ns) / NANOSECONDS if len(held.first) else math.inf
 
 
@@ -162,21 +168,25 @@ def silence_metrics(measured: Errors) -> dict[str, float]:
     if count == 0:
         return dict.fromkeys(("age_p95", "dropouts", "dropout_s", "coverage"), math.nan)
     valid = np.isfinite(measured.position)
-    silent = stretches(~valid, measured.run)
-    after = np.minimum(silent.last + 1, count - 1)
-    after = np.where(measured.run[after] == measured.run[silent.last], after, silent.last)
+    silent = stretches(~valid, measured.instants.starts)
     return {
         "age_p95": quantile(measured.age_s, 0.95),
         "dropouts": float(len(silent.first)),
-        "dropout_s": float((measured.time_ns[after] - measured.time_ns[silent.first]).sum()) / NANOSECONDS,
+        "dropout_s": _silence_s(measured, silent) if len(silent.first) else 0.0,
         "coverage": _coverage(measured, valid),
     }
+
+
+def _silence_s(measured: Errors, silent: Stretches) -> float:
+    after = np.minimum(silent.last + 1, len(measured.run) - 1)
+    after = np.where(measured.run[after] == measured.run[silent.last], after, silent.last)
+    return float((measured.time_ns[after] - measured.time_ns[silent.first]).sum()) / NANOSECONDS
 
 
 def _coverage(measured: Errors, valid: Flags) -> float:
     if valid.all():
         return 1.0
-    column, row = np.floor(measured.x / CELL_M), np.floor(measured.y / CELL_M)
+    column, row = np.floor(measured.instants.x / CELL_M), np.floor(measured.instants.y / CELL_M)
     _, cell = np.unique(column + 1j * row, return_inverse=True)
     answered = np.bincount(cell, weights=valid) / np.bincount(cell)
     return float(np.count_nonzero(answered >= COVERED) / len(answered))

@@ -7,10 +7,13 @@ is about no later time, held constant, and one that is too old counts as none at
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.metrics.course import Instants
 from benchmarks.metrics.track import BEFORE_ALL_NS, Flags, Floats, Track, Whole
 from fusion.values import NANOSECONDS, nanoseconds
 from logs.run import TruthTrack
@@ -21,24 +24,13 @@ GAP_S = 0.5
 """Across a longer gap the truth is not interpolated."""
 MAX_AGE_S = 1.0
 """An older estimate counts as none."""
-
-
-class Instants(NamedTuple):
-    """The true poses to be met: all (n,); [m], [rad], map frame; heading NaN where it is not known."""
-
-    time_ns: Whole
-    x: Floats
-    y: Floats
-    heading: Floats
-
-    def at(self, rows: Whole | Flags) -> Instants:
-        """Some of them, by index or mask."""
-        return Instants(self.time_ns[rows], self.x[rows], self.y[rows], self.heading[rows])
+KEPT_COURSES = 2
+"""Truths whose instants are kept: cells come run by run."""
 
 
 class Answers(NamedTuple):
-    """What counts at each instant, all (n,): x, y [m], heading [rad], NaN where not known; ``covariance`` (n, 3, 3),
-    NaN where none was claimed. ``valid`` is False, too, for what is too old.
+    """What counts at each instant, all (n,): x, y [m], heading [rad], NaN where not known; ``covariance`` (n, 6) as
+    in `Track`, NaN where none was claimed. ``valid`` is False, too, for what is too old.
 
     ``age_s`` is the instant minus the stamp of the newest answer, infinite before the first; ``since_fix_s`` the time
     since the last radio measurement that was used, NaN before the first, or where nothing says what was used.
@@ -54,10 +46,11 @@ class Answers(NamedTuple):
 
 
 def wrap_angles(angles: Floats) -> Floats:
-    """Angles [rad] brought into [-pi, pi): `fusion.wrap_angle` for arrays."""
-    return np.asarray((angles + np.pi) % (2.0 * np.pi) - np.pi)
+    """Angles [rad] brought into [-pi, pi]: `fusion.wrap_angle` for arrays."""
+    return np.asarray(angles - math.tau * np.rint(angles / math.tau))
 
 
+@lru_cache(maxsize=KEPT_COURSES)
 def evaluation_instants(truth: TruthTrack, *, hz: float = RATE_HZ, gap_s: float = GAP_S) -> Instants:
     """The truth's own stamps when its median rate is below ``hz``, else its clock resampled uniformly at ``hz``.
 
@@ -116,32 +109,34 @@ def match(instants: Instants, track: Track, *, max_age_s: float = MAX_AGE_S) -> 
 def _newest(instants: Instants, stamp_ns: Whole, received_ns: Whole) -> tuple[Whole, Flags]:
     """Index of the newest stamp received by each instant, and whether any was; no index at all without stamps."""
     due_ns = np.maximum(received_ns, stamp_ns)
-    by_due = np.argsort(due_ns, kind="stable")
-    stamps = stamp_ns[by_due]
-    rising = stamps >= np.maximum.accumulate(stamps)
-    newest = by_due[np.maximum.accumulate(np.where(rising, np.arange(len(stamps)), 0))]
-    due = np.searchsorted(due_ns[by_due], instants.time_ns, side="right") - 1
+    in_order = (stamp_ns[1:] >= stamp_ns[:-1]).all()
+    by_due = np.arange(len(due_ns)) if in_order else np.argsort(due_ns, kind="stable")
+    due = np.searchsorted(due_ns if in_order else due_ns[by_due], instants.time_ns, side="right") - 1
     heard = due >= 0
-    return newest[np.maximum(due, 0)] if len(newest) else newest, heard
+    newest = by_due if in_order else by_due[_record(stamp_ns[by_due])]
+    return newest.take(np.maximum(due, 0)) if len(newest) else newest, heard
+
+
+def _record(stamps: Whole) -> Whole:
+    """Index of the greatest of all up to each, of several the last."""
+    rising = stamps >= np.maximum.accumulate(stamps)
+    return np.asarray(np.maximum.accumulate(np.where(rising, np.arange(len(stamps)), 0)))
 
 
 def _since_fix_s(instants: Instants, received_ns: Whole, fixes_ns: Whole) -> Floats:
     """Seconds since the newest of ``fixes_ns`` received by each instant, NaN without any."""
-    since = np.full(len(instants.time_ns), np.nan)
-    received = np.searchsorted(received_ns, instants.time_ns, side="right") - 1
-    last_ns = np.maximum.accumulate(np.concatenate([[BEFORE_ALL_NS], fixes_ns]))[received + 1]
-    some = last_ns > BEFORE_ALL_NS
-    since[some] = (instants.time_ns[some] - last_ns[some]) / NANOSECONDS
-    return since
+    received = np.searchsorted(received_ns, instants.time_ns, side="right")
+    last_ns = np.maximum.accumulate(np.concatenate([[BEFORE_ALL_NS], fixes_ns])).take(received)
+    return np.where(last_ns > BEFORE_ALL_NS, (instants.time_ns - last_ns) / NANOSECONDS, np.nan)
 
 
 def _answers(instants: Instants, said: Track, heard: Flags, since_fix_s: Floats, max_age_s: float) -> Answers:
     if len(said.time_ns) == 0:
         unknown = np.full(len(heard), np.nan)
-        nothing = np.full((len(heard), 3, 3), np.nan)
-        return Answers(heard & False, unknown, unknown, unknown, nothing, np.full(len(heard), np.inf), unknown)
+        no_claim = np.full((len(heard), 6), np.nan)
+        return Answers(heard & False, unknown, unknown, unknown, no_claim, np.full(len(heard), np.inf), unknown)
     age_ns = instants.time_ns - said.time_ns
     valid = heard & (age_ns <= nanoseconds(max_age_s)) & said.usable
     age_s = np.where(heard, age_ns / NANOSECONDS, np.inf)
     x, y, _ = said.pose.T
-    return Answers(valid, x, y, said.heading, said.covariance_matrices, age_s, since_fix_s)
+    return Answers(valid, x, y, said.heading, said.covariance, age_s, since_fix_s)

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.metrics.instants import GAP_S, Answers, Instants, interpolate_truth, known_truth
+from benchmarks.metrics.course import Instants
+from benchmarks.metrics.instants import GAP_S, Answers, interpolate_truth, known_truth
 from benchmarks.metrics.track import Floats, Track, Whole
 from fusion.values import NANOSECONDS, nanoseconds
 from logs.run import TruthTrack
@@ -42,7 +43,7 @@ def meet(truth: TruthTrack, track: Track, *, gap_s: float = GAP_S) -> Met:
     now, unknown = np.zeros(len(x)), np.full(len(x), np.nan)
     steps_s = np.minimum(np.diff(instants.time_ns), nanoseconds(gap_s)) / NANOSECONDS
     weight = 0.5 * (np.append(steps_s, 0.0) + np.insert(steps_s, 0, 0.0)) if len(now) else now
-    answers = Answers(said.usable, x, y, said.heading, said.covariance_matrices, now, unknown)
+    answers = Answers(said.usable, x, y, said.heading, said.covariance, now, unknown)
     gaps_ns = np.diff(known.time_ns)
     watched_s = float(gaps_ns[gaps_ns <= nanoseconds(gap_s)].sum()) / NANOSECONDS
     return Met(instants, answers, weight, min(float(weight.sum()) / watched_s, 1.0) if watched_s else np.nan)

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.metrics.course import DISTANCES_M, DURATIONS_S
 from benchmarks.metrics.pair import PairScore
-from benchmarks.metrics.trajectory import DISTANCES_M, DURATIONS_S
 from benchmarks.sheet import Sheet
 from benchmarks.table import Column, as_text
 

@@ -12,65 +12,46 @@ import numpy as np
 
 from benchmarks.metrics.deviation import Errors
 from benchmarks.metrics.quantiles import Ordered, mean, means, quantile, quantiles, root_mean_square, root_mean_squares
-from benchmarks.metrics.samples import effective_sizes, order_shares
-from benchmarks.metrics.track import Flags, Floats
+from benchmarks.metrics.track import Flags, Floats, points
 
 AUC_RADIUS_M = 3.0
 POSITION_QUANTILES = {"pos_p50": 0.50, "pos_p75": 0.75, "pos_p90": 0.90, "pos_p95": 0.95, "pos_p99": 0.99}
 CDF_RADII_M = {"10cm": 0.1, "30cm": 0.3, "50cm": 0.5, "1m": 1.0, "2m": 2.0, "3m": 3.0}
 """By the ends of their ids."""
-GREATEST = float(np.finfo(np.float64).max)
+RADII_M = np.array([*CDF_RADII_M.values()])
 
 
-def position_metrics(measured: Errors) -> dict[str, float]:
-    """Mean, RMSE, spread, quantiles and their 95 % intervals, distribution function and the area under it to 3 m.
+def position_metrics(measured: Errors, ordered: Ordered) -> dict[str, float]:
+    """Mean, RMSE, spread, quantiles, distribution function and the area under it to 3 m; ``ordered``: the errors.
 
     ``availability`` is the share of instants with a valid answer.
     """
     weight, position = measured.weight, measured.position
-    valid, own = _where(np.isfinite(position), position, weight)
+    answered = np.isfinite(position)
+    valid, own = _where(answered, position, weight)
     centre = mean(valid, own)
-    ordered = Ordered.of(position, weight)
-    found = {name: ordered.quantile(share) for name, share in POSITION_QUANTILES.items()}
     return {
         "n": float(len(position)),
         "n_valid": float(len(valid)),
-        "availability": mean(np.isfinite(position), weight),
+        "availability": mean(answered, weight),
         "pos_mean": centre,
         "pos_rmse": root_mean_square(valid, own),
         "pos_std": root_mean_square(valid - centre, own),
         "pos_min": float(valid.min()) if len(valid) else math.nan,
         "pos_max": float(valid.max()) if len(valid) else math.nan,
         "pos_auc": mean(np.maximum(0.0, 1.0 - position / AUC_RADIUS_M), weight),
-        **_within(position, weight),
-        **found,
-        **_quantile_intervals(measured, ordered, found),
+        **_within(position, ordered, weight),
+        **{name: ordered.quantile(share) for name, share in POSITION_QUANTILES.items()},
     }
 
 
-def _within(position: Floats, weight: Floats | None) -> dict[str, float]:
+def _within(position: Floats, ordered: Ordered, weight: Floats | None) -> dict[str, float]:
     """``pos_cdf_1m`` and so on: the distribution function of the error, F(r), at named radii."""
-    inside = position <= np.array([*CDF_RADII_M.values()])[:, None]
-    return {f"pos_cdf_{name}": share for name, share in zip(CDF_RADII_M, means(inside, weight), strict=True)}
-
-
-def _quantile_intervals(measured: Errors, ordered: Ordered, found: dict[str, float]) -> dict[str, float]:
-    """``pos_p75_low`` and so on: 95 % intervals of the quantiles by binomial order statistics.
-
-    ``n_eff`` is the effective sample size of the error, cut off at 3 m; each quantile's is that of being below it.
-    """
-    position = measured.position
-    limits = np.minimum(list(found.values()), GREATEST)
-    series = np.empty((1 + len(limits), len(position)))
-    series[0] = np.minimum(position, AUC_RADIUS_M)
-    series[1:] = position <= limits[:, None]
-    sizes = effective_sizes(series, measured.run)
-    own, *others = sizes.tolist()
-    scores = {"n_eff": own}
-    for (name, share), samples in zip(POSITION_QUANTILES.items(), others, strict=True):
-        low, high = order_shares(share, samples)
-        scores |= {f"{name}_low": ordered.quantile(low), f"{name}_high": ordered.quantile(high)}
-    return scores
+    if weight is None and len(position):
+        shares = (np.searchsorted(ordered.values, RADII_M, side="right") / len(position)).tolist()
+    else:
+        shares = means(position <= RADII_M[:, None], weight)
+    return {f"pos_cdf_{name}": share for name, share in zip(CDF_RADII_M, shares, strict=True)}
 
 
 def axis_metrics(measured: Errors) -> dict[str, float]:
@@ -99,11 +80,12 @@ AXIS_IDS = (
 
 def track_metrics(measured: Errors) -> dict[str, float]:
     """Errors along the true heading, forward positive, and across it, left positive: RMSE, bias, p95 of the size."""
-    cos, sin = np.cos(measured.true_heading), np.sin(measured.true_heading)
-    error = np.array([cos * measured.dx + sin * measured.dy, cos * measured.dy - sin * measured.dx])
+    facing = measured.instants.facing
+    turned = points(measured.dx, measured.dy) * facing.conj()
+    error = np.array([turned.real, turned.imag])
     there = np.isfinite(error[0])
     valid, own = _where(there, error, measured.weight)
-    asked = np.isfinite(measured.true_heading)
+    asked = ~np.isnan(facing)
     size, weight = _where(asked, np.where(there, np.abs(error), np.inf), measured.weight)
     of_both = (root_mean_squares(valid, own), means(valid, own), quantiles(size, 0.95, weight))
     named = zip(("rmse", "bias", "p95"), of_both, strict=True)

@@ -11,6 +11,11 @@ from numpy.typing import NDArray
 from benchmarks.metrics.track import Floats
 
 
+def known(values: Floats) -> Floats:
+    """Those that are not NaN; most often that is all of them, which a sum tells fastest."""
+    return values[~np.isnan(values)] if math.isnan(np.add.reduce(values)) else values
+
+
 def mean(values: Floats | NDArray[np.bool_], weight: Floats | None = None) -> float:
     """The mean, every value counting ``weight`` times (None: once); NaN of nothing."""
     if len(values) == 0:
@@ -38,7 +43,9 @@ def means(rows: Floats | NDArray[np.bool_], weight: Floats | None = None) -> lis
 
 def root_mean_square(values: Floats, weight: Floats | None = None) -> float:
     """The root of the mean square; NaN of nothing."""
-    return math.sqrt(mean(values * values, weight))
+    if weight is not None or len(values) == 0:
+        return math.sqrt(mean(values * values, weight))
+    return math.sqrt(values.dot(values) / len(values))
 
 
 def root_mean_squares(rows: Floats, weight: Floats | None = None) -> list[float]:
@@ -51,20 +58,20 @@ def quantile(values: Floats, share: float, weight: Floats | None = None) -> floa
 
     ``numpy.percentile`` answers NaN for the median of (1, 2, inf), for it computes 0 * inf.
     """
-    return quantiles(values[None], share, weight)[0]
+    count = len(values)
+    if weight is not None or count == 0:
+        return Ordered.of(values, weight).quantile(share)
+    # One value in its place, and the least of those above it, cost less than putting all in order.
+    below, part = _place((count - 1) * share)
+    split = values.copy()
+    split.partition(below)
+    low = split.item(below)
+    return _between(low, float(np.minimum.reduce(split[below + 1 :])), part) if part else low
 
 
 def quantiles(rows: Floats, share: float, weight: Floats | None = None) -> list[float]:
     """The `quantile` of each row of (k, n)."""
-    count = rows.shape[1]
-    if weight is not None or count == 0:
-        return [Ordered.of(row, weight).quantile(share) for row in rows]
-    # One value in its place, and the least of those above it, cost half of putting all in order.
-    below, part = _place((count - 1) * share)
-    split = np.partition(rows, below, axis=1)
-    lows = split[:, below].tolist()
-    highs = np.minimum.reduce(split[:, below + 1 :], axis=1).tolist() if part else lows
-    return [_between(low, high, part) for low, high in zip(lows, highs, strict=True)]
+    return [quantile(row, share, weight) for row in rows]
 
 
 def _place(place: float) -> tuple[int, float]:
@@ -107,4 +114,4 @@ class Ordered(NamedTuple):
             return math.nan
         place = (count - 1) * share if self.stands is None else float(np.interp(share, self.stands, np.arange(count)))
         below, part = _place(place)
-        return _between(self.values[below].item(), self.values[min(below + 1, count - 1)].item(), part)
+        return _between(self.values.item(below), self.values.item(min(below + 1, count - 1)), part)

@@ -20,43 +20,44 @@ BATCH = 1 << 16
 """Values transformed at once: more would cost memory and gain nothing."""
 
 
-def effective_sizes(series: Floats, run: Whole) -> Floats:
+def effective_sizes(series: Floats, run: Whole, leader: Whole | None = None) -> Floats:
     """Effective sample size n / (1 + 2 sum of autocorrelations) of each row of ``series`` (k, n), summed over runs.
 
     ``run`` (n,) numbers the runs whose values stand one after the other. The sum of autocorrelations is Geyer's
     initial monotone sequence (Statistical Science 7(4), 1992, section 3.3); no size exceeds n. A row that never
-    changes within a run has none of its own and takes that of the first row; if this is constant as well, 1.
+    changes within a run has none of its own and takes that of its ``leader`` (k,), None: the first row; if this is
+    constant as well, 1.
     """
     if series.shape[1] == 0:
         return np.full(len(series), np.nan)
+    followed = np.zeros(len(series), dtype=np.int64) if leader is None else leader
     if run[0] == run[-1]:
-        return _of_one_run(series)
-    borders = np.flatnonzero(np.diff(run)) + 1
-    parts = [_of_one_run(part) for part in np.split(series, borders, axis=1)]
+        return _of_one_run(series, followed)
+    borders = np.flatnonzero(run[1:] != run[:-1]) + 1
+    parts = [_of_one_run(part, followed) for part in np.split(series, borders, axis=1)]
     return np.asarray(np.sum(parts, axis=0), dtype=np.float64)
 
 
-def _of_one_run(series: Floats) -> Floats:
+def _of_one_run(series: Floats, leader: Whole) -> Floats:
     spans = np.maximum.reduce(series, axis=1) - np.minimum.reduce(series, axis=1)
     changing = np.flatnonzero(spans)
     sizes = np.ones(len(series))
     at_once = max(BATCH // series.shape[1], 1)
     for first in range(0, len(changing), at_once):
         rows = changing[first : first + at_once]
-        sizes[rows] = _of_rows(series[rows] / spans[rows, None])
-    if len(changing) and changing[0] == 0:
-        sizes[spans == 0.0] = sizes[0]
-    return sizes
+        chosen = series if len(rows) == len(series) else series[rows]
+        sizes[rows] = _of_rows(chosen / spans[rows, None])
+    return np.where(spans == 0.0, sizes[leader], sizes)
 
 
 def _of_rows(series: Floats) -> Floats:
     """Autocorrelations by the fast Fourier transform (Wiener & Khinchin)."""
     count = series.shape[1]
-    centred = series - np.add.reduce(series, axis=1, keepdims=True) / count
+    series -= np.add.reduce(series, axis=1, keepdims=True) / count
     lags = max(count // 4 * 2, 2)
     length = min(small << max((count + lags - 1) // small, 1).bit_length() for small in (4, 5, 6))
-    spectrum = np.fft.rfft(centred, length)
-    covariance = np.fft.irfft(spectrum.real**2 + spectrum.imag**2, length)[:, :lags]
+    spectrum = np.fft.rfft(series, length)
+    covariance = np.fft.irfft(spectrum * spectrum.conj(), length)[:, :lags]
     return np.asarray(count / _time(covariance))
 
 
@@ -99,5 +100,5 @@ def mean_chi_square_band(dimension: float, samples: float) -> tuple[float, float
     from scipy.special import gammaincinv
 
     degrees = dimension * samples
-    low, high = 2.0 * gammaincinv(0.5 * degrees, np.array([TAIL, 1.0 - TAIL])) / degrees
-    return float(low), float(high)
+    low, high = (2.0 * float(gammaincinv(0.5 * degrees, share)) / degrees for share in (TAIL, 1.0 - TAIL))
+    return low, high

@@ -10,15 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from benchmarks.metrics.consistency import CHI_SQUARE_95, consistency_metrics, distribution_metrics
+from benchmarks.metrics.consistency import CHI_SQUARE_95, Claimed, consistency_metrics, distribution_metrics
 from benchmarks.metrics.deviation import Errors, errors, pool
 from benchmarks.metrics.drift import drift_metrics
 from benchmarks.metrics.dynamics import dynamic_metrics
+from benchmarks.metrics.intervals import interval_metrics, quantile_intervals
 from benchmarks.metrics.position import axis_metrics, heading_metrics, position_metrics, track_metrics
-from benchmarks.metrics.quantiles import quantile
+from benchmarks.metrics.quantiles import Ordered, quantile
 from benchmarks.metrics.trajectory import trajectory_metrics
 
-METRICS_VERSION = 7
+METRICS_VERSION = 8
 """Changes whenever a metric does, so that stored scores are not taken for current ones."""
 
 __all__ = [
@@ -36,20 +37,27 @@ __all__ = [
 
 def metrics(measured: Errors) -> dict[str, float]:
     """All metrics by id, in m and rad; shares in [0, 1]. NaN where nothing can be said, infinite where most is lost."""
+    ordered, claimed = Ordered.of(measured.position, measured.weight), Claimed.of(measured)
     return {
-        **absolute_metrics(measured),
+        **_point_metrics(measured, ordered),
         **trajectory_metrics(measured),
         **drift_metrics(measured),
-        **consistency_metrics(measured),
+        **consistency_metrics(measured, claimed),
         **distribution_metrics(measured),
         **dynamic_metrics(measured),
+        **interval_metrics(measured, ordered, claimed),
     }
 
 
 def absolute_metrics(measured: Errors) -> dict[str, float]:
     """Those of position and heading alone, which are all that alignment changes."""
+    ordered = Ordered.of(measured.position, measured.weight)
+    return {**_point_metrics(measured, ordered), **quantile_intervals(measured, ordered)}
+
+
+def _point_metrics(measured: Errors, ordered: Ordered) -> dict[str, float]:
     return {
-        **position_metrics(measured),
+        **position_metrics(measured, ordered),
         **axis_metrics(measured),
         **track_metrics(measured),
         **heading_metrics(measured),

@@ -18,11 +18,19 @@ from fusion.track import Key, order
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Stamps = Whole
+Points = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
 BEFORE_ALL_NS = np.iinfo(np.int64).min
 NO_CLAIM = (np.nan,) * 6
 BELIEVED = (Decision.USED, Decision.DOWNWEIGHTED)
+
+
+def points(x: Floats, y: Floats) -> Points:
+    """Points of the plane as complex numbers, (n,): x + iy."""
+    plane = np.empty(len(x), dtype=np.complex128)
+    plane.real, plane.imag = x, y
+    return plane
 
 
 class Track(NamedTuple):
@@ -84,13 +92,13 @@ class Track(NamedTuple):
     def at(self, rows: Whole) -> Track:
         """Some of it, by index."""
         return Track(
-            self.received_ns[rows],
-            self.time_ns[rows],
-            self.pose[rows],
-            self.covariance[rows],
-            self.valid[rows],
-            self.heading_known[rows],
-            self.fix_ns[rows],
+            self.received_ns.take(rows),
+            self.time_ns.take(rows),
+            self.pose.take(rows, axis=0),
+            self.covariance.take(rows, axis=0),
+            self.valid.take(rows),
+            self.heading_known.take(rows),
+            self.fix_ns.take(rows),
         )
 
     @property
@@ -102,11 +110,6 @@ class Track(NamedTuple):
     def heading(self) -> Floats:
         """[rad], NaN where it is not known."""
         return np.where(self.heading_known & np.isfinite(self.pose[:, 2]), self.pose[:, 2], np.nan)
-
-    @property
-    def covariance_matrices(self) -> Floats:
-        """(n, 3, 3)."""
-        return self.covariance[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
 
     @property
     def is_sound(self) -> bool:

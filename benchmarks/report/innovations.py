@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.metrics.consistency import CEILING
 from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.innovations import NAMES
+from benchmarks.metrics.intervals import CEILING
 from benchmarks.metrics.quantiles import mean
 from benchmarks.metrics.samples import effective_sizes, mean_chi_square_band
 from benchmarks.report.cells import link

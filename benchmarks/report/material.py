@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.metrics.bound import Places, Radio, fix_error
+from benchmarks.metrics.course import Instants
 from benchmarks.metrics.deviation import Errors, errors
 from benchmarks.metrics.fates import FateColumns
-from benchmarks.metrics.instants import Answers, Instants, evaluation_instants, match
+from benchmarks.metrics.instants import Answers, evaluation_instants, match
 from benchmarks.metrics.track import Floats
 from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.execute import stored_track

@@ -12,8 +12,9 @@ import numpy as np
 from benchmarks.cell import Score
 from benchmarks.colours import Colour, colour_of
 from benchmarks.lane import Lane
+from benchmarks.metrics.course import Instants
 from benchmarks.metrics.fates import FateColumns, fates_per_update
-from benchmarks.metrics.instants import Answers, Instants, evaluation_instants, match, wrap_angles
+from benchmarks.metrics.instants import Answers, evaluation_instants, match, wrap_angles
 from benchmarks.metrics.track import Floats, Whole
 from benchmarks.review.columns import DrawnTrack, EstimateColumns
 from benchmarks.review.events import Events, States, events, states
@@ -38,7 +39,7 @@ def signed_errors(instants: Instants, answers: Answers) -> SignedErrors:
     """Of ``answers``, which belong to ``instants`` one by one."""
     turn = wrap_angles(answers.heading - instants.heading)
     error = np.column_stack([answers.x - instants.x, answers.y - instants.y, turn])
-    variance = np.diagonal(answers.covariance, axis1=1, axis2=2)
+    variance = answers.covariance[:, [0, 3, 5]]
     known = answers.valid[:, None] & np.isfinite(error)
     return SignedErrors(np.where(known, error, np.nan), np.where(known & np.isfinite(variance), variance, np.nan))
 

@@ -3,14 +3,20 @@
 import numpy as np
 import pytest
 
-from benchmarks.metrics.instants import Answers, Instants, wrap_angles
+from benchmarks.metrics.course import Instants
+from benchmarks.metrics.instants import Answers, wrap_angles
 
 
 def _answers_of(x, y, heading, covariance=None, valid=None):
     n = len(x)
-    claimed = np.full((n, 3, 3), np.nan) if covariance is None else np.broadcast_to(covariance, (n, 3, 3))
+    claimed = np.full((n, 6), np.nan) if covariance is None else _as_columns(covariance, n)
     known = np.ones(n, dtype=bool) if valid is None else np.asarray(valid)
     return Answers(known, np.array(x, float), np.array(y, float), heading, claimed, np.zeros(n), np.full(n, np.nan))
+
+
+def _as_columns(covariance, n):
+    rows, columns = np.triu_indices(3)
+    return np.broadcast_to(covariance, (n, 3, 3))[:, rows, columns]
 
 
 def _instants_of(time_s, x, y, heading):
@@ -21,6 +27,12 @@ def _instants_of(time_s, x, y, heading):
 def answers_of():
     """Answers from x, y, heading (n,), one covariance (3, 3) or many, and where they are valid."""
     return _answers_of
+
+
+@pytest.fixture(scope="session")
+def as_columns():
+    """Covariances (3, 3) or (n, 3, 3), and n, as answers have them, (n, 6)."""
+    return _as_columns
 
 
 @pytest.fixture(scope="session")

@@ -101,7 +101,7 @@ def test_distance_from_the_limit_is_told_where_it_is_asked_for(material):
 def test_efficiency_of_fixes_is_that_of_the_bound_at_the_true_places(material):
     cell = material.series["office", "radio"]
     world, bound_m = material.run("office").world, material.fix_bound_m(cell)
-    x, y, heading = (float(column[7]) for column in cell.instants[1:])
+    x, y, heading = (float(column[7]) for column in (cell.instants.x, cell.instants.y, cell.instants.heading))
     assert bound_m[7] == pytest.approx(np.sqrt(np.trace(rssi_fix_bound(world, x, y, heading))), rel=1e-12)
     valid = cell.answers.valid
     ratio = np.sqrt(np.mean(bound_m[valid] ** 2) / np.mean(cell.error_m[valid] ** 2))

@@ -13,13 +13,16 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.metrics.archive import from_bytes, to_bytes
-from benchmarks.metrics.consistency import consistency_metrics, distribution_metrics
-from benchmarks.metrics.deviation import errors
+from benchmarks.metrics.consistency import Claimed, consistency_metrics, distribution_metrics
+from benchmarks.metrics.course import Instants
+from benchmarks.metrics.deviation import Errors, errors
 from benchmarks.metrics.drift import drift_metrics
 from benchmarks.metrics.dynamics import dynamic_metrics
 from benchmarks.metrics.fates import FateColumns
-from benchmarks.metrics.instants import Instants, evaluation_instants, match
+from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.intervals import interval_metrics
 from benchmarks.metrics.position import axis_metrics, heading_metrics, position_metrics, track_metrics
+from benchmarks.metrics.quantiles import Ordered
 from benchmarks.metrics.score import for_json, metrics
 from benchmarks.metrics.track import Track
 from benchmarks.metrics.trajectory import trajectory_metrics
@@ -27,24 +30,25 @@ from benchmarks.runner.store import to_json
 from logs.run import TruthTrack
 
 RATE_HZ = 10.0
-KINDS = (
-    position_metrics,
-    axis_metrics,
-    track_metrics,
-    heading_metrics,
-    trajectory_metrics,
-    drift_metrics,
-    consistency_metrics,
-    distribution_metrics,
-    dynamic_metrics,
-)
-ANCHOR, PAIR, RESCORED = "transform of eight series", "one pair", "one stored cell scored anew"
+KINDS: dict[str, Callable[[Errors, Ordered, Claimed], object]] = {
+    "position": lambda measured, ordered, _: position_metrics(measured, ordered),
+    "axes": lambda measured, *_: axis_metrics(measured),
+    "along and across": lambda measured, *_: track_metrics(measured),
+    "heading": lambda measured, *_: heading_metrics(measured),
+    "trajectory": lambda measured, *_: trajectory_metrics(measured),
+    "drift": lambda measured, *_: drift_metrics(measured),
+    "consistency": lambda measured, _, claimed: consistency_metrics(measured, claimed),
+    "distribution": lambda measured, *_: distribution_metrics(measured),
+    "dynamics": lambda measured, *_: dynamic_metrics(measured),
+    "intervals": interval_metrics,
+}
+ANCHOR, PAIR, RESCORED = "transform of eight series", "one pair, all metrics", "one stored cell scored anew"
 
 
 class Pair(NamedTuple):
     """A figure of eight, and a track beside it whose errors last for two seconds."""
 
-    truth: TruthTrack
+    instants: Instants
     track: Track
 
     @classmethod
@@ -59,14 +63,10 @@ class Pair(NamedTuple):
         error *= 0.2, 0.15, 0.02
         time_ns = np.rint(1e9 * t).astype(np.int64)
         said = Track.of_poses(time_ns, x + error[:, 0], y + error[:, 1], heading + error[:, 2])
+        instants = evaluation_instants(TruthTrack(time_ns, x, y, heading))
         claimed = np.tile([0.04, 0.0, 0.0, 0.0225, 0.0, 0.0004], (poses, 1))
         fixes_ns = time_ns // 2_000_000_000 * 2_000_000_000
-        return cls(TruthTrack(time_ns, x, y, heading), said._replace(covariance=claimed, fix_ns=fixes_ns))
-
-    @property
-    def instants(self) -> Instants:
-        """Where it is judged."""
-        return evaluation_instants(self.truth)
+        return cls(instants, said._replace(covariance=claimed, fix_ns=fixes_ns))
 
 
 class Cost(NamedTuple):
@@ -81,14 +81,16 @@ def measure(poses: int = 1000, rounds: int = 200, pairs: int = 4) -> list[Cost]:
     """The anchor, a pair with all its metrics, each kind of them by itself, and a stored cell."""
     drawn = [Pair.drawn(poses, seed) for seed in range(pairs)]
     met = [(pair.instants, match(pair.instants, pair.track)) for pair in drawn]
-    measured = [errors(*one) for one in met]
+    measured = [in_order(errors(*one)) for one in met]
     stored = [(pair.instants, to_bytes(pair.track, FateColumns.of([]))) for pair in drawn]
     series = [np.random.default_rng(seed).normal(size=(8, poses)) for seed in range(pairs)]
     jobs: list[tuple[str, Callable, list]] = [
         (ANCHOR, lambda rows: np.fft.irfft(np.fft.rfft(rows)), series),
-        (PAIR, lambda one: metrics(errors(*one)), met),
+        (PAIR, lambda pair: metrics(errors(pair.instants, match(pair.instants, pair.track))), drawn),
+        ("match", lambda pair: match(pair.instants, pair.track), drawn),
         ("errors", lambda one: errors(*one), met),
-        *((kind.__name__, kind, measured) for kind in KINDS),
+        ("in order", lambda one: in_order(one[0]), measured),
+        *((name, lambda one, kind=kind: kind(*one), measured) for name, kind in KINDS.items()),
         (RESCORED, rescore, stored),
     ]
     least = {name: np.inf for name, _, _ in jobs}
@@ -96,6 +98,11 @@ def measure(poses: int = 1000, rounds: int = 200, pairs: int = 4) -> list[Cost]:
         for name, work, inputs in jobs:
             least[name] = min(least[name], _each_us(work, inputs))
     return [Cost(name, us, us / least[ANCHOR]) for name, us in least.items()]
+
+
+def in_order(measured: Errors) -> tuple[Errors, Ordered, Claimed]:
+    """What `metrics` makes of the errors once for all its kinds."""
+    return measured, Ordered.of(measured.position, measured.weight), Claimed.of(measured)
 
 
 def rescore(stored: tuple[Instants, bytes]) -> bytes:

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics.alignment import align
-from benchmarks.metrics.instants import Instants, match
+from benchmarks.metrics.course import Instants
+from benchmarks.metrics.instants import match
 from benchmarks.metrics.score import errors, metrics
 from benchmarks.metrics.tracks import read_track, read_truth
 from benchmarks.metrics.trajectory import Poses, relative_errors

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from benchmarks.metrics.claims import energy_scores, judge
-from benchmarks.metrics.consistency import CHI_SQUARE_95, consistency_metrics, distribution_metrics
+from benchmarks.metrics.claims import _tail, energy_scores, judge
+from benchmarks.metrics.consistency import CHI_SQUARE_95, distribution_metrics
 from benchmarks.metrics.deviation import errors
-from benchmarks.metrics.position import position_metrics
+from benchmarks.metrics.intervals import quantile_intervals
+from benchmarks.metrics.quantiles import Ordered
 from benchmarks.metrics.samples import binomial_interval, effective_sizes, mean_chi_square_band, order_shares
+from benchmarks.metrics.score import metrics
 
 BANDS = {
     (1, 1): (0.0010, 5.0239),
@@ -79,7 +81,8 @@ def test_intervals_with_effective_size_hold_what_they_promise(instants_of, answe
     for _ in range(trials):
         error = np.abs(correlated(r, rho, 1500))
         instants = instants_of(0.1 * np.arange(1500), *np.zeros((3, 1500)))
-        scores = position_metrics(errors(instants, answers_of(error, *np.zeros((2, 1500)))))
+        measured = errors(instants, answers_of(error, *np.zeros((2, 1500))))
+        scores = quantile_intervals(measured, Ordered.of(measured.position))
         quantile += scores["pos_p75_low"] <= p75 <= scores["pos_p75_high"]
         hit = error < 1.0
         (size,) = effective_sizes(hit[None].astype(float), np.zeros(1500, dtype=np.int64))
@@ -116,7 +119,7 @@ def drawn_from_claim(instants_of, answers_of, n=4000, scale=1.0):
 
 def test_honest_filter_is_found_honest(honest):
     instants, answers, _, _ = honest()
-    scores = consistency_metrics(errors(instants, answers))
+    scores = metrics(errors(instants, answers))
     assert scores["anees_band_low"] < scores["anees"] < scores["anees_band_high"]
     assert scores["anees_band_low"] < 1.0 < scores["anees_band_high"]
     assert scores["cover95_low"] < 0.95 < scores["cover95_high"]
@@ -125,7 +128,7 @@ def test_honest_filter_is_found_honest(honest):
 
 def test_overconfident_filter_is_found_out(honest):
     instants, answers, _, _ = honest(scale=1.3)
-    scores = consistency_metrics(errors(instants, answers))
+    scores = metrics(errors(instants, answers))
     assert scores["anees"] > scores["anees_band_high"]
     assert scores["cover95_high"] < 0.95
 
@@ -141,12 +144,10 @@ def test_likelihood_and_nees_are_those_of_scipy(honest):
     )
 
 
-def test_proper_scores_prefer_the_honest_claim(honest):
+def test_proper_scores_prefer_the_honest_claim(honest, as_columns):
     instants, answers, _, covariance = honest()
     scores = [
-        distribution_metrics(
-            errors(instants, answers._replace(covariance=np.broadcast_to(f * covariance, (4000, 3, 3))))
-        )
+        distribution_metrics(errors(instants, answers._replace(covariance=as_columns(f * covariance, 4000))))
         for f in (0.25, 1.0, 4.0)
     ]
     for name in ("nll_2d", "nll_3d", "energy"):
@@ -158,6 +159,12 @@ def test_energy_score_of_a_round_gaussian_has_its_closed_form():
     none, var = np.zeros(1), np.full(1, 0.09)
     expected = 0.3 * math.sqrt(math.pi / 2.0) * (1.0 - math.sqrt(0.5))
     assert energy_scores(none, none, var, none, var)[0] == pytest.approx(expected, rel=1e-6)
+
+
+def test_energy_score_keeps_its_word_on_the_tail_it_approximates():
+    by_std = np.linspace(0.0, 8.0, 801)
+    exact = 2.0 * stats.norm.sf(by_std)
+    np.testing.assert_allclose(_tail(by_std) * np.exp(-0.5 * by_std**2), exact, atol=2.5e-5)
 
 
 def test_energy_score_of_a_certain_claim_is_the_error():
@@ -190,10 +197,10 @@ def test_energy_score_agrees_with_draws():
     assert energy_scores(*columns)[0] == pytest.approx(expected, rel=5e-3)
 
 
-def test_singular_or_indefinite_claims_are_infinitely_wrong():
+def test_singular_or_indefinite_claims_are_infinitely_wrong(as_columns):
     error = np.full(3, 0.1)
     claims = np.array([np.diag([1.0, 1.0, 0.0]), np.diag([1.0, 0.0, 1.0]), [[1, 2, 0], [2, 1, 0], [0, 0, 1]]])
-    judged = judge(error, error, error, claims)
+    judged = judge(error, error, error, as_columns(claims, 3))
     assert np.isinf(judged.nees).all()
     assert np.isinf(judged.nll).all()
     assert np.isinf(judged.nees_2d).tolist() == [False, True, True]
@@ -204,6 +211,28 @@ def test_only_what_was_claimed_is_judged(oracle_a):
     instants, answers = oracle_a
     some = answers.covariance.copy()
     some[::2] = np.nan
-    judged = consistency_metrics(errors(instants, answers._replace(covariance=some)))
+    judged = metrics(errors(instants, answers._replace(covariance=some)))
     half = errors(instants, answers)
     assert judged["anees"] == pytest.approx(half.nees[1::2].mean() / 3.0, rel=1e-12)
+
+
+def test_series_that_never_changes_follows_its_own_leader():
+    r = np.random.default_rng(6)
+    white, slow, constant = r.normal(size=1000), np.cumsum(r.normal(size=1000)), np.ones(1000)
+    series = np.array([white, constant, slow, constant])
+    first, second, third, fourth = effective_sizes(series, ONE_RUN[:1000], np.array([0, 0, 2, 2]))
+    assert first == second != third == fourth
+
+
+def test_intervals_of_a_claim_at_some_instants_are_those_of_these_instants_alone(honest):
+    """All series are transformed at once only where every instant has a claim."""
+    instants, answers, _, _ = honest(2000)
+    half = answers._replace(covariance=np.where(np.arange(2000)[:, None] < 1000, answers.covariance, np.nan))
+    some, rest = metrics(errors(instants, half)), metrics(errors(instants.at(np.arange(1000)), first_of(answers, 1000)))
+    for name in ("anees_n_eff", "anees_band_low", "cover95_n_eff", "cover95_low"):
+        assert some[name] == pytest.approx(rest[name], rel=1e-12)
+    assert some["n_eff"] == pytest.approx(metrics(errors(instants, answers))["n_eff"], rel=1e-12)
+
+
+def first_of(answers, count):
+    return type(answers)(*(column[:count] for column in answers))

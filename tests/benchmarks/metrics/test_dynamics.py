@@ -34,10 +34,10 @@ def off_by(instants_of, answers_of):
 
 def test_stretches_end_where_a_run_ends():
     mask = np.array([True, True, False, True, True, True])
-    found = stretches(mask, np.array([0, 0, 0, 0, 1, 1]))
+    found = stretches(mask, (0, 4))
     assert found.first.tolist() == [0, 3, 4]
     assert found.last.tolist() == [1, 3, 5]
-    assert len(stretches(mask & False, np.zeros(6)).first) == 0
+    assert len(stretches(mask & False).first) == 0
 
 
 def test_convergence_is_the_first_time_below_a_metre_for_five_seconds(off_by):

@@ -151,7 +151,7 @@ def test_track_alone_is_matched_as_its_updates_were():
     by_track = match(instants, Track.of_estimates([update.estimate for update in updates]))
     for column, other in zip(by_updates, by_track, strict=True):
         np.testing.assert_array_equal(column, other)
-    np.testing.assert_array_equal(Track.of_estimates([updates[1].estimate]).covariance_matrices[0], claimed.matrix)
+    np.testing.assert_array_equal(Track.of_estimates([updates[1].estimate]).covariance[0], claimed)
 
 
 @settings(derandomize=True, max_examples=50)

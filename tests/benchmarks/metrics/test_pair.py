@@ -9,7 +9,8 @@ import pytest
 
 from benchmarks.metrics import pair_verb
 from benchmarks.metrics.alignment import align
-from benchmarks.metrics.instants import Answers, Instants
+from benchmarks.metrics.course import Instants
+from benchmarks.metrics.instants import Answers
 from benchmarks.metrics.pair import MODES, score_pair
 from benchmarks.metrics.score import errors, metrics
 from benchmarks.metrics.tracks import read_track, read_truth
@@ -32,7 +33,7 @@ def paired(truth, estimate):
     """Pose k with pose k, whatever their stamps."""
     true, said = read_truth(truth), read_track(estimate)
     ages = np.zeros(len(true)), np.full(len(true), np.nan)
-    answers = Answers(said.usable, *said.pose[:, :2].T, said.heading, said.covariance_matrices, *ages)
+    answers = Answers(said.usable, *said.pose[:, :2].T, said.heading, said.covariance, *ages)
     return Instants(true.time_ns, true.x, true.y, true.heading), answers
 
 

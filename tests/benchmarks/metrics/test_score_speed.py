@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.metrics import samples
+from benchmarks.metrics import course, samples
 from benchmarks.metrics.deviation import errors, pool
 from benchmarks.metrics.score import metrics
 
@@ -24,9 +24,24 @@ def transforms(monkeypatch):
     return shapes
 
 
-def test_all_series_of_a_kind_are_transformed_at_once(oracle_a, transforms):
+def test_all_series_are_transformed_at_once(oracle_a, transforms):
     metrics(errors(*oracle_a))
-    assert transforms == [(6, 1000), (2, 1000)]
+    assert transforms == [(8, 1000)]
+
+
+def test_series_of_fewer_claims_are_transformed_by_themselves(oracle_a, transforms):
+    instants, answers = oracle_a
+    some = np.where(np.arange(1000)[:, None] % 2, answers.covariance, np.nan)
+    metrics(errors(instants, answers._replace(covariance=some)))
+    assert transforms == [(6, 1000), (2, 500)]
+
+
+def test_what_follows_from_the_truth_alone_is_found_once_for_all_estimators(oracle_a, monkeypatch):
+    instants, answers = oracle_a
+    before = metrics(errors(instants, answers))
+    for work in ("ahead", "later", "points"):
+        monkeypatch.setattr(course, work, None)
+    assert metrics(errors(instants, answers._replace(x=answers.x + 1.0)))["rpe_d_1m_n"] == before["rpe_d_1m_n"]
 
 
 def test_long_series_are_transformed_a_few_at_a_time_to_spare_memory(instants_of, answers_of, transforms):
@@ -39,12 +54,12 @@ def test_long_series_are_transformed_a_few_at_a_time_to_spare_memory(instants_of
 def test_runs_that_are_pooled_are_transformed_one_by_one(oracle_a, transforms):
     measured = errors(*oracle_a)
     metrics(pool([measured, measured]))
-    assert transforms == [(6, 1000)] * 2 + [(2, 1000)] * 2
+    assert transforms == [(8, 1000)] * 2
 
 
 def test_cost_of_a_pair_is_told_by_kinds_of_metrics():
     told = runpy.run_path(str(Path(__file__).with_name("score_speed.py")))
     costs = {cost.what: cost for cost in told["measure"](poses=50, rounds=2, pairs=1)}
-    assert set(costs) > {told["ANCHOR"], told["PAIR"], told["RESCORED"], "errors", "trajectory_metrics"}
+    assert set(costs) > {told["ANCHOR"], told["PAIR"], told["RESCORED"], "match", "errors", "trajectory"}
     assert costs[told["ANCHOR"]].ratio == 1.0
     assert all(cost.least_us > 0.0 for cost in costs.values())

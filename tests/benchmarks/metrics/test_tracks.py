@@ -98,7 +98,7 @@ def test_lane_of_a_log_keeps_claims_and_what_was_not_valid_is_not_in_it(tmp_path
     track = read_track(f"{log}:ekf")
     assert track.valid.all()
     assert (track.time_ns - START_NS).tolist() == [0, 200_000_000, 300_000_000, 400_000_000]
-    np.testing.assert_allclose(track.covariance_matrices[0], np.diag([0.01, 0.04, 0.09]), rtol=1e-12)
+    np.testing.assert_allclose(track.covariance[0], [0.01, 0.0, 0.0, 0.04, 0.0, 0.09], rtol=1e-12)
     only = log_at(tmp_path / "one.mcap", "ekf")
     np.testing.assert_array_equal(read_track(only).pose, track.pose)
 

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.metrics.course import ahead
 from benchmarks.metrics.deviation import errors
-from benchmarks.metrics.trajectory import Poses, ahead, relative_errors, trajectory_metrics
+from benchmarks.metrics.trajectory import Poses, relative_errors, trajectory_metrics
 from fusion import Pose
 
 ANGLES, PLACES = st.floats(-3.0, 3.0), st.floats(-20.0, 20.0)
