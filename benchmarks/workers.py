@@ -2,31 +2,34 @@
 
 A worker that dies costs its task one more try in a fresh process; one that dies twice is lost. A task that takes too
 long or too much memory is lost at once, with its process: it would do so again. What the process pools of the
-standard library and of joblib lose in such a case is everything that was submitted.
+standard library and of joblib lose in such a case is everything that was submitted. No process outlives the one that
+started it.
 """
 
 from __future__ import annotations
 
 import os
-import signal
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import suppress
 from enum import Enum, unique
 from multiprocessing import get_context
-from multiprocessing.connection import Connection, wait
-from pathlib import Path
-from typing import Any, Generic, NamedTuple, NoReturn, TypeVar
+from multiprocessing.connection import wait
+from typing import Any, Generic, NamedTuple, TypeVar
 
+from benchmarks.worker_process import OUT_OF_MEMORY, Answer, serve
 from fusion import FusionError
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-OUT_OF_MEMORY = 77
-"""Exit code by which a worker says that its task took more memory than it may."""
-WATCH_S = 0.05
+_PROCESSES = threading.RLock()
+"""Held to start a process or to learn how one ended: whenever `multiprocessing` starts one, in whatever thread, it
+buries all that have ended, and who asks at that moment is told nothing.
+"""
 
 
 class Limits(NamedTuple):
@@ -59,52 +62,67 @@ def compute(
     if workers <= 1 and limits is None:
         yield from ((index, work(task)) for index, task in enumerate(tasks))
         return
-    crew = _Crew(work, limits or Limits())
-    waiting, died = deque(range(len(tasks))), set[int]()
+    crew = Crew(work, lost, limits or Limits())
     try:
-        while waiting or crew.busy:
-            crew.staff(min(workers, len(waiting) + crew.busy))
-            for index, answer in crew.turn(waiting, tasks):
+        yield from crew.compute(tasks, workers)
+    finally:
+        crew.dismiss()
+
+
+class Crew(Generic[Task, Result]):
+    """The processes at work: started when they are needed, and kept for the next tasks until they are dismissed.
+
+    One that has nothing to do for ``idle_s`` ends by itself; None: never.
+    """
+
+    def __init__(
+        self,
+        work: Callable[[Task], Result],
+        lost: Callable[[Task, Loss], Result],
+        limits: Limits,
+        idle_s: float | None = None,
+    ) -> None:
+        self._work, self._lost, self._limits, self._idle_s = work, lost, limits, idle_s
+        self._workers: list[_Worker] = []
+        self._dismissed = False
+
+    def compute(self, tasks: Sequence[Task], workers: int) -> Iterator[tuple[int, Result]]:
+        """As `compute`, in up to ``workers`` processes. Raises `CancelledError` once another thread dismisses them.
+
+        Several processes whose tasks were not all answered, as after an error, are of no further use.
+        """
+        waiting, died = deque(range(len(tasks))), set[int]()
+        self._workers = [worker for worker in self._workers if not isinstance(worker.listen(), Loss)]
+        while waiting or self._busy:
+            self._staff(min(workers, len(waiting) + self._busy))
+            for index, answer in self._turn(waiting, tasks):
                 if not isinstance(answer, Loss):
                     yield index, answer.result()
                 elif answer is Loss.CRASHED and index not in died:
                     died.add(index)
                     waiting.appendleft(index)
                 else:
-                    yield index, lost(tasks[index], answer)
-    finally:
-        crew.dismiss()
+                    yield index, self._lost(tasks[index], answer)
 
-
-class _Answer(NamedTuple):
-    """What a worker sends back: a value, or what was raised instead."""
-
-    value: Any
-    raised: BaseException | None = None
-
-    def result(self) -> Any:  # noqa: ANN401 - whatever the work answers
-        if self.raised is not None:
-            raise self.raised
-        return self.value
-
-
-class _Crew(Generic[Task, Result]):
-    """The processes at work."""
-
-    def __init__(self, work: Callable[[Task], Result], limits: Limits) -> None:
-        self._work, self._limits = work, limits
-        self._workers: list[_Worker] = []
+    def dismiss(self) -> None:
+        """End every process, at work or not, for good."""
+        with _PROCESSES:
+            self._dismissed = True
+            for worker in self._workers:
+                worker.kill()
 
     @property
-    def busy(self) -> int:
+    def _busy(self) -> int:
         return sum(worker.index is not None for worker in self._workers)
 
-    def staff(self, count: int) -> None:
+    def _staff(self, count: int) -> None:
         """As many processes as are needed."""
-        while len(self._workers) < count:
-            self._workers.append(_Worker(self._work, self._limits))
+        with _PROCESSES:
+            self._require_not_dismissed()
+            while len(self._workers) < count:
+                self._workers.append(_Worker(self._work, self._limits, self._idle_s))
 
-    def turn(self, waiting: deque[int], tasks: Sequence[Task]) -> Iterator[tuple[int, _Answer | Loss]]:
+    def _turn(self, waiting: deque[int], tasks: Sequence[Task]) -> Iterator[tuple[int, Answer | Loss]]:
         """Hand out work, wait until something happens, and answer what became of tasks."""
         for worker in self._workers:
             if worker.ready and waiting:
@@ -116,26 +134,29 @@ class _Crew(Generic[Task, Result]):
         for worker in tuple(self._workers):
             at, answer = worker.index, worker.listen()
             if isinstance(answer, Loss):
+                self._require_not_dismissed()
                 self._workers.remove(worker)
                 worker.require_started()
             if at is not None and answer is not None:
                 yield at, answer
 
-    def dismiss(self) -> None:
-        for worker in self._workers:
-            worker.kill()
+    def _require_not_dismissed(self) -> None:
+        """What is lost with a process that was dismissed says nothing about its task."""
+        if self._dismissed:
+            raise CancelledError("dismissed while at work")
 
 
 class _Worker:
     """One process, and the task it is at."""
 
-    def __init__(self, work: Callable[[Any], Any], limits: Limits) -> None:
-        # One thread each, or the workers' linear algebra fights for the same cores; and no salted hashes.
-        for name, value in (("OMP_NUM_THREADS", "1"), ("OPENBLAS_NUM_THREADS", "1"), ("PYTHONHASHSEED", "0")):
-            os.environ.setdefault(name, value)
+    def __init__(self, work: Callable[[Any], Any], limits: Limits, idle_s: float | None) -> None:
+        # One thread each, or the workers' linear algebra fights for the same cores; and the same hashes everywhere.
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+            os.environ.setdefault(name, "1")
+        os.environ["PYTHONHASHSEED"] = "0"
         context = get_context("spawn")
         self.connection, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs, work, limits.rss_mb), daemon=True)
+        self._process = context.Process(target=serve, args=(theirs, work, limits.rss_mb, idle_s), daemon=True)
         self._process.start()
         theirs.close()
         self._wall_s = limits.wall_s
@@ -154,19 +175,21 @@ class _Worker:
     def give(self, index: int, task: object) -> None:
         self.ready, self.index = False, index
         self.deadline_s = None if self._wall_s is None else time.monotonic() + self._wall_s
-        self.connection.send(task)
+        with suppress(BrokenPipeError):  # it died while it had nothing to do, and `listen` will say so
+            self.connection.send(task)
 
-    def listen(self) -> _Answer | Loss | None:
+    def listen(self) -> Answer | Loss | None:
         """What it has to say now; None: nothing, or that it is ready for its first task."""
         try:
             answer = self.connection.recv() if self.connection.poll() else None
         except (EOFError, OSError):
-            self._process.join()
-            return Loss.OUT_OF_MEMORY if self._process.exitcode == OUT_OF_MEMORY else Loss.CRASHED
+            with _PROCESSES:
+                self._process.join()
+                return Loss.OUT_OF_MEMORY if self._process.exitcode == OUT_OF_MEMORY else Loss.CRASHED
         if answer is not None:
             self._started = self.ready = True
             self.index = self.deadline_s = None
-            return answer if isinstance(answer, _Answer) else None
+            return answer if isinstance(answer, Answer) else None
         if self.deadline_s is not None and time.monotonic() >= self.deadline_s:
             self.kill()
             return Loss.TIMEOUT
@@ -175,39 +198,3 @@ class _Worker:
     def kill(self) -> None:
         self._process.kill()
         self._process.join()
-
-
-def _serve(connection: Connection, work: Callable[[Any], Any], rss_mb: float | None) -> None:
-    """The life of a worker: say that it is ready, then answer task after task until nobody asks any more."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if rss_mb is not None:
-        threading.Thread(target=_watch_memory, args=(rss_mb,), daemon=True).start()
-    connection.send("ready")
-    while True:
-        try:
-            task = connection.recv()
-        except EOFError:
-            return
-        try:
-            answer = _Answer(work(task))
-        except Exception as error:  # noqa: BLE001 - it is raised where the result is asked for
-            answer = _Answer(None, error)
-        connection.send(answer)
-
-
-def _watch_memory(rss_mb: float) -> NoReturn:
-    """End the process once it has ever held more than it may."""
-    while peak_rss_bytes() <= rss_mb * 2**20:
-        time.sleep(WATCH_S)
-    os._exit(OUT_OF_MEMORY)
-
-
-def peak_rss_bytes() -> int:
-    """The most memory that this process ever held. Linux's own resource usage would count what the parent held, too."""
-    try:
-        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-        return 1024 * int(next(line for line in lines if line.startswith("VmHWM")).split()[1])
-    except (OSError, StopIteration):
-        import resource
-
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -7,13 +7,16 @@ whatever a cluster loses is made up for by running again.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import Any
+from uuid import uuid4
 
-from benchmarks.runner.execute import Done, carry_out, give_up
+from benchmarks.runner.execute import Done
 from benchmarks.runner.plan import Cell
 from benchmarks.runner.store import Store
-from benchmarks.workers import Loss
+from benchmarks.workers import Limits
 from fusion import FusionError
 
 RETRIES = 1
@@ -21,27 +24,67 @@ PATIENCE_S = 10.0
 """How long a scheduler may take to answer."""
 
 
-def execute_on_dask(cells: Sequence[Cell], store: Store, address: str) -> Iterator[Done]:
+def execute_on_dask(cells: Sequence[Cell], store: Store, address: str, limits: Limits) -> Iterator[Done]:
     """Carry out ``cells`` on the cluster whose scheduler is at ``address``; each is answered as it is done.
 
-    A worker that dies gives its cells back; one that dies of the same cell again loses that cell alone. Raises
-    `FusionError` without the package, or when nobody answers.
+    A cell that dies or breaks ``limits`` costs itself alone. A Dask worker that dies gives its cells back; those that
+    Dask gives up since too many died are no results: they stay missing, which a `FusionError` tells when the rest is
+    done. Raises that also without the package, and when nobody answers (any more).
     """
     dask = _distributed()
-    folder = store.folder.resolve()
-    with _connect(dask, address) as client:
-        futures = {
-            client.submit(carry_out, (cell, folder), key=cell.score_key, retries=RETRIES, pure=False): cell
-            for cell in cells
-        }
-        for future in dask.as_completed(list(futures)):
-            cell = futures[future]
-            try:
-                status = future.result()
-            except dask.KilledWorker:
-                status = give_up((cell, folder), Loss.CRASHED)
+    with _connect(dask, address) as client, _cell_processes(client, limits) as plugin:
+        futures = _submit(client, plugin, cells, store)
+        try:
+            yield from _as_done(dask, futures)
+        except CancelledError as error:
+            raise FusionError(f"--dask {address}: the scheduler went away; start it, then run again") from error
+        finally:
+            client.cancel(list(futures))
+
+
+def _as_done(dask: Any, futures: dict[Any, Cell]) -> Iterator[Done]:  # noqa: ANN401 - the package
+    unfinished = []
+    for future in dask.as_completed(list(futures)):
+        cell = futures[future]
+        try:
+            status = future.result()
+        except dask.KilledWorker:
+            unfinished.append(cell)
+        else:
             yield Done(cell, status)
-            future.release()
+        future.release()
+    if unfinished:
+        raise FusionError(
+            f"cells that are not done: {len(unfinished)}, one of them {unfinished[0]}; one Dask worker after the other "
+            "died with them; see the workers' logs (out of memory? lower limits.rss_mb of the suite), then run again"
+        )
+
+
+@contextmanager
+def _cell_processes(client: Any, limits: Limits) -> Iterator[str]:  # noqa: ANN401 - a client
+    """Processes for the cells of this run on every worker that is there or comes later; answers their plugin's name."""
+    from benchmarks.runner.cluster_worker import CellProcesses
+
+    name = f"fusion-bench-{uuid4()}"
+    client.register_plugin(CellProcesses(limits), name)
+    try:
+        yield name
+    finally:
+        with suppress(OSError):  # a cluster that is gone has taken them with it
+            client.unregister_worker_plugin(name)
+
+
+def _submit(client: Any, plugin: str, cells: Sequence[Cell], store: Store) -> dict[Any, Cell]:  # noqa: ANN401
+    """A future for each cell. Another run on the same cluster may have the same cells, but not the same processes."""
+    from benchmarks.runner.cluster_worker import carry_out_here
+
+    folder = store.folder.resolve()
+    return {
+        client.submit(
+            carry_out_here, plugin, (cell, folder), key=f"{plugin}-{cell.score_key}", retries=RETRIES, pure=False
+        ): cell
+        for cell in cells
+    }
 
 
 def _distributed() -> Any:  # noqa: ANN401 - an optional package, much of it without annotations

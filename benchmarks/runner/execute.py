@@ -17,7 +17,7 @@ from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.innovations import innovation_metrics
 from benchmarks.metrics.track import Track
 from benchmarks.review.frame import Frame
-from benchmarks.runner.definition import CLEAN, CellLimits
+from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.judge import judge
 from benchmarks.runner.plan import Cell, read_faults
 from benchmarks.runner.source import open_run
@@ -39,14 +39,13 @@ class Done(NamedTuple):
     status: str
 
 
-def execute(cells: Sequence[Cell], store: Store, *, workers: int, limits: CellLimits | None) -> Iterator[Done]:
+def execute(cells: Sequence[Cell], store: Store, *, workers: int, limits: Limits | None) -> Iterator[Done]:
     """Carry out ``cells``; each is answered as it is done, and what is in the store already is left as it is.
 
     ``limits`` None: in this process when ``workers`` is 1, and without an end.
     """
     tasks = [(cell, store.folder) for cell in cells]
-    bounded = None if limits is None else Limits(limits.wall_s, limits.rss_mb)
-    for index, status in compute(carry_out, give_up, tasks, workers, bounded):
+    for index, status in compute(carry_out, give_up, tasks, workers, limits):
         yield Done(cells[index], status)
 
 

@@ -17,6 +17,7 @@ from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.results import ALIVE, Result, leaderboard, read_results
 from benchmarks.runner.store import Store
 from benchmarks.sheet import print_sheets
+from benchmarks.workers import Limits
 
 
 def run_suite(
@@ -47,12 +48,13 @@ def _carried_out(
 ) -> Iterator[Done]:
     if not todo:
         return iter(())
+    limits = Limits(suite.limits.wall_s, suite.limits.rss_mb)
     if dask is not None:
         from benchmarks.runner.cluster import execute_on_dask
 
-        return execute_on_dask(todo, store, dask)
+        return execute_on_dask(todo, store, dask, limits)
     count = os.cpu_count() or 1 if workers is None else workers
-    return execute(todo, store, workers=min(count, len(todo)), limits=suite.limits)
+    return execute(todo, store, workers=min(count, len(todo)), limits=limits)
 
 
 def lost(results: Sequence[Result]) -> list[str]:
@@ -66,7 +68,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     suite_options(parser)
     parser.add_argument("-j", "--workers", type=at_least_one, metavar="N", help="processes; one per core by default")
     parser.add_argument("--shard", type=_shard, metavar="I/N", help="only the I-th of N parts, by key")
-    parser.add_argument("--dask", metavar="ADDRESS", help="carry the cells out on this Dask scheduler; its limits hold")
+    parser.add_argument("--dask", metavar="ADDRESS", help="carry the cells out on this Dask scheduler")
 
 
 def _shard(text: str) -> tuple[int, int]:

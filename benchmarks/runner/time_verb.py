@@ -21,7 +21,8 @@ from benchmarks.runner.definition import Contestant, RunSource, Suite, load_suit
 from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.source import open_run
 from benchmarks.sheet import Sheet, print_sheets
-from benchmarks.workers import Limits, Loss, compute, peak_rss_bytes
+from benchmarks.worker_process import peak_rss_bytes
+from benchmarks.workers import Limits, Loss, compute
 from fusion.values import seconds
 from logs.run import Run
 

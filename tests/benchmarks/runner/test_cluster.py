@@ -1,16 +1,21 @@
-"""The same suite on a real Dask cluster: same results, and a worker that is killed takes no other cell with it."""
+"""The same suite on a real Dask cluster: same results, and what dies, hangs or eats memory costs itself only."""
 
 import os
 import signal
+from contextlib import suppress
 
 import pytest
 
 from benchmarks.runner.definition import load_suite
+from benchmarks.runner.plan import cells_of
+from benchmarks.runner.results import read_results
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
 from fusion import FusionError
 
 distributed = pytest.importorskip("distributed")
+dask = pytest.importorskip("dask")
+psutil = pytest.importorskip("psutil")
 
 SUITE = """
 [suite]
@@ -27,6 +32,58 @@ use = "dead_reckoning"
 id = "pf"
 use = "particle"
 """
+LIMITS = "limits = { wall_s = 8.0, rss_mb = 400.0 }"
+TROUBLE = """
+[[estimators]]
+id = "hangs"
+use = "hangs"
+[[estimators]]
+id = "eats"
+use = "eats"
+[[estimators]]
+id = "exits"
+use = "exits"
+[[estimators]]
+id = "faults"
+use = "faults"
+"""
+PLUGIN = """
+import os, pathlib, signal, time
+
+class Hangs:
+    summary, tags = "trouble", frozenset()
+    def __init__(self, world): pass
+    def start(self, prior, seed):
+        while True: time.sleep(60.0)
+    def step(self, state, measurement): raise NotImplementedError
+    def estimate(self, state, time_ns): raise NotImplementedError
+
+class Eats(Hangs):
+    def start(self, prior, seed):
+        held = []
+        while True: held.append(bytearray(20 * 2**20)); time.sleep(0.01)
+
+class Exits(Hangs):
+    def start(self, prior, seed): os._exit(3)
+
+class Faults(Hangs):
+    def start(self, prior, seed): os.kill(os.getpid(), signal.SIGSEGV)
+
+class KillsItsParent(Hangs):
+    def __init__(self, world, pid_file: str = ""): self.pid_file = pid_file
+    def start(self, prior, seed):
+        pathlib.Path(self.pid_file).write_text(str(os.getpid()))
+        os.kill(os.getppid(), signal.SIGKILL)
+        return super().start(prior, seed)
+"""
+ENTRY_POINTS = """
+[fusion.estimators]
+hangs = troublesome:Hangs
+eats = troublesome:Eats
+exits = troublesome:Exits
+faults = troublesome:Faults
+kills_its_parent = troublesome:KillsItsParent
+"""
 
 
 @pytest.fixture
@@ -35,14 +92,58 @@ def cluster():
         yield running
 
 
+@pytest.fixture(scope="module", autouse=True)
+def troublesome(tmp_path_factory):
+    """Estimators of a stranger, installed for whatever process starts from here."""
+    site = tmp_path_factory.mktemp("site")
+    (site / "troublesome.py").write_text(PLUGIN, encoding="utf-8")
+    (site / "troublesome-1.dist-info").mkdir()
+    (site / "troublesome-1.dist-info" / "METADATA").write_text("Name: troublesome\nVersion: 1\n", encoding="utf-8")
+    (site / "troublesome-1.dist-info" / "entry_points.txt").write_text(ENTRY_POINTS, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(site)
+        yield
+
+
+@pytest.fixture
+def lone_worker(troublesome):
+    """One Dask worker with two threads, and one death of a worker is enough for Dask to give its tasks up."""
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=True, dashboard_address=None) as running,
+    ):
+        yield running
+
+
+def suite_of(text, tmp_path):
+    path = tmp_path / "suite.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_suite(path)
+
+
+def with_limits(text, limits=LIMITS):
+    return text.replace("seeds = 3", f"seeds = 1\n{limits}")
+
+
 def digests(results):
     return [(str(result.cell), result.status, result.digest, dict(result.metrics)) for result in results]
 
 
+def statuses(results):
+    return {result.cell.contestant.id: result.status for result in results}
+
+
+def everything(store):
+    paths = (path for path in store.folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(store.folder)): path.read_bytes() for path in paths}
+
+
+def worker_of(cluster):
+    return psutil.Process(cluster.workers[0].pid)
+
+
 def test_cluster_gives_the_results_of_one_process_though_a_worker_is_killed(cluster, tmp_path):
-    path = tmp_path / "suite.toml"
-    path.write_text(SUITE, encoding="utf-8")
-    suite = load_suite(path)
+    suite = suite_of(SUITE, tmp_path)
     first_worker = next(iter(cluster.workers.values())).pid
     killed = []
 
@@ -56,9 +157,52 @@ def test_cluster_gives_the_results_of_one_process_though_a_worker_is_killed(clus
     assert digests(on_cluster) == digests(run_suite(suite, Store(tmp_path / "alone"), workers=1))
 
 
+def test_cell_that_hangs_dies_or_eats_memory_costs_itself_only(lone_worker, tmp_path):
+    """To the byte what a run on this machine stores, and the Dask worker is the one it was."""
+    suite, worker = suite_of(with_limits(SUITE + TROUBLE), tmp_path), worker_of(lone_worker)
+    here, there = Store(tmp_path / "here"), Store(tmp_path / "there")
+    found = run_suite(suite, there, dask=lone_worker.scheduler_address)
+    lost = {"hangs": "timeout", "eats": "oom", "exits": "crashed", "faults": "crashed"}
+    assert statuses(found) == {"wheels": "ok", "pf": "ok", **lost}
+    assert worker == worker_of(lone_worker)
+    assert worker.children() == []
+    assert digests(run_suite(suite, here, workers=2)) == digests(found)
+    assert everything(here) == everything(there)
+
+
+def test_interrupted_run_leaves_no_process_and_a_store_that_is_gone_on_with(lone_worker, tmp_path):
+    text, store, address = SUITE + TROUBLE, Store(tmp_path / "store"), lone_worker.scheduler_address
+    patient = suite_of(with_limits(text, "limits = { wall_s = 3600.0, rss_mb = 400.0 }"), tmp_path)
+    told = []
+
+    def interrupt(done, total, what):
+        told.append((done, total))
+        raise KeyboardInterrupt
+
+    with suppress(KeyboardInterrupt):
+        run_suite(patient, store, dask=address, progress=interrupt)
+    assert told == [(1, 6)]
+    assert worker_of(lone_worker).children() == []
+    assert "hangs" not in statuses(read_results(cells_of(patient, store), store))
+    resumed = run_suite(suite_of(with_limits(text), tmp_path), store, dask=address)
+    assert sorted(statuses(resumed).values()) == ["crashed", "crashed", "ok", "ok", "oom", "timeout"]
+
+
+def test_cell_whose_dask_worker_died_is_not_done_rather_than_crashed(lone_worker, tmp_path):
+    """What the cluster loses says nothing about the estimator; and a cell does not outlive its Dask worker."""
+    store, pid_file = Store(tmp_path / "store"), tmp_path / "pid"
+    use = f'use = "kills_its_parent"\nparams = {{ pid_file = "{pid_file}" }}\n'
+    suite = suite_of(f'{with_limits(SUITE, "")}\n[[estimators]]\nid = "killer"\n{use}', tmp_path)
+    with pytest.raises(FusionError, match="died with them"):
+        run_suite(suite, store, dask=lone_worker.scheduler_address)
+    assert "killer" not in statuses(read_results(cells_of(suite, store), store))
+    with suppress(psutil.NoSuchProcess):
+        psutil.Process(int(pid_file.read_text("ascii"))).wait(60.0)
+    healthy = suite_of(with_limits(SUITE, ""), tmp_path)
+    assert statuses(run_suite(healthy, store, dask=lone_worker.scheduler_address)) == {"wheels": "ok", "pf": "ok"}
+
+
 def test_scheduler_that_does_not_answer_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr("benchmarks.runner.cluster.PATIENCE_S", 1.0)
-    path = tmp_path / "suite.toml"
-    path.write_text(SUITE, encoding="utf-8")
     with pytest.raises(FusionError, match="no scheduler answers"):
-        run_suite(load_suite(path), Store(tmp_path / "store"), dask="tcp://127.0.0.1:9")
+        run_suite(suite_of(SUITE, tmp_path), Store(tmp_path / "store"), dask="tcp://127.0.0.1:9")
