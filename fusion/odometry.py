@@ -21,6 +21,10 @@ from fusion.world import DRIVES, Robot
 
 MAX_HOLD_NS = nanoseconds(0.5)
 """Longest time a twist is held without new odometry, unless odometry itself comes more slowly."""
+SHORT_NS = nanoseconds(0.005)
+"""Stamps closer than this are those of a late message and its successor: the motion between them took longer."""
+TWIST_NS = nanoseconds(0.05)
+"""The twist of an increment that short is the mean over this time, what came before taken as steady."""
 MAX_GYRO_AGE_NS = nanoseconds(0.2)
 """Oldest gyro sample that still gives the turn; beyond it the wheels do."""
 MAX_WHEEL_SPEED_M_S = 10.0
@@ -110,6 +114,20 @@ class OdometerState(NamedTuple):
     gyro_angle_at_last: float = 0.0
 
 
+def _twisted(state: OdometerState, own: Odometry, turn_rad: float) -> OdometerState:
+    """The state with the twist of an increment: its mean, or over `TWIST_NS` where it is too short to say."""
+    span_ns = own.time_ns - own.from_ns
+    if span_ns >= SHORT_NS or state.span_ns == 0:
+        span_s = max(seconds(span_ns), 1e-9)
+        return state._replace(span_ns=span_ns, speed_m_s=own.distance_m / span_s, turn_rate_rad_s=turn_rad / span_s)
+    before, span_s = 1.0 - span_ns / TWIST_NS, seconds(TWIST_NS)
+    return state._replace(
+        span_ns=TWIST_NS,
+        speed_m_s=before * state.speed_m_s + own.distance_m / span_s,
+        turn_rate_rad_s=before * state.turn_rate_rad_s + turn_rad / span_s,
+    )
+
+
 class Odometer:
     """Turns one robot's motion measurements into `Odometry`. Holds the robot only; the state is a value."""
 
@@ -183,13 +201,11 @@ class Odometer:
             turn - state.held_turn_rad,
             odometry.measured,
         )
-        span_s = max(seconds(own.time_ns - own.from_ns), 1e-9)
+        state = _twisted(state, own, turn)
         return state._replace(
             covered_ns=max(state.covered_ns, odometry.time_ns),
             last_ns=odometry.time_ns,
-            span_ns=odometry.time_ns - odometry.from_ns,
-            speed_m_s=own.distance_m / span_s,
-            turn_rate_rad_s=turn / span_s,
+            span_ns=max(state.span_ns, odometry.time_ns - odometry.from_ns),
             held_distance_m=0.0,
             held_turn_rad=0.0,
             gyro_angle_at_last=angle,

@@ -6,6 +6,7 @@ import random
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -264,6 +265,19 @@ def test_motion_held_up_to_a_radio_reading_is_counted_once():
     assert [m.time_ns for m in seen] == [SECOND, SECOND + SECOND // 4, 2 * SECOND]
     assert sum(m.distance_m for m in seen) == pytest.approx(1.8)
     assert sum(m.turn_rad for m in seen) == pytest.approx(0.1)
+
+
+@settings(derandomize=True, max_examples=40)
+@given(st.integers(0, nanoseconds(0.004)), st.integers(1, 99), st.floats(0.1, 1.5))
+def test_message_stamped_right_behind_the_one_before_makes_no_leap(behind_ns, held_ms, speed_m_s):
+    """Steady motion at 10 Hz; a reception held up stamps two messages almost alike, then comes a radio reading."""
+    odometer, tenth, step_m = Odometer(Robot()), SECOND // 10, 0.1 * speed_m_s
+    state, stamps = odometer.start(0), [0, tenth, 3 * tenth, 3 * tenth + behind_ns]
+    for k, (from_ns, until_ns) in enumerate(pairwise(stamps)):
+        state, _ = odometer.advance(state, Odometry(until_ns, "w", k, from_ns, step_m, 0.2))
+    _, (held,) = odometer.hold(state, stamps[-1] + held_ms * SECOND // 1000)
+    assert 0.0 < held.distance_m < 3.0 * step_m
+    assert 0.0 < held.turn_rad < 3.0 * 0.2
 
 
 DRIVE = Drive(noisy=True, duration_s=8.0)
