@@ -1,0 +1,161 @@
+"""One picture of a report, and where what is drawn in it leads: to a cell, and where it is a moment to that."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Iterable, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.metrics.track import Floats
+from benchmarks.page import inline_png
+from benchmarks.plotting import as_png, label, panels, plain_ticks
+
+FINE = 1e4
+"""Into how many parts width and height of a picture are divided, to say where something is."""
+
+POINTING = """
+function pointAt(figure, targets) {
+  const hint = figure.appendChild(document.createElement("small"));
+  const ring = figure.appendChild(document.createElement("i"));
+  const nearest = (event) => {
+    const box = figure.firstElementChild.getBoundingClientRect();
+    let best = { away: 24 };
+    for (const [cell, said, xs, ys, times] of targets) {
+      for (let k = 0; k < xs.length; k++) {
+        const x = box.width * xs[k] / 1e4, y = box.height * ys[k] / 1e4;
+        const away = Math.hypot(box.left + x - event.clientX, box.top + y - event.clientY);
+        if (away < best.away) best = { away, x, y, cell, said, at: times && times[k].toFixed(2) };
+      }
+    }
+    return best;
+  };
+  const show = ({ x, y, said, at }) => {
+    ring.style.cssText = said ? `left: ${x}px; top: ${y}px` : "display: none";
+    hint.textContent = said ? said + (at ? `, at ${at} s` : "") : "";
+    figure.style.cursor = said ? "pointer" : "";
+  };
+  show({});
+  figure.onpointermove = (event) => show(nearest(event));
+  figure.onpointerleave = () => show({});
+  figure.firstElementChild.onclick = (event) => {
+    const found = nearest(event);
+    show(found);
+    if (!found.cell) return;
+    if (found.at) tellMoment(document.getElementById(found.cell), found.at);
+    if (location.hash === "#" + found.cell) reveal();
+    location.hash = found.cell;
+  };
+}
+function tellMoment(entry, at) {
+  const command = entry.querySelector("code");
+  let told = entry.querySelector(".moment");
+  if (!told) {
+    told = entry.appendChild(document.createElement("div"));
+    told.className = "moment";
+    told.append(document.createElement("span"), document.createElement("code"));
+    offerCopy(told.lastChild);
+  }
+  told.firstChild.textContent = `what was clicked, at ${at} s: `;
+  told.lastChild.textContent = command.textContent.replace(/--at [0-9.]+/, `--at ${at}`);
+}
+for (const figure of document.querySelectorAll("[data-targets]")) pointAt(figure, JSON.parse(figure.dataset.targets));
+"""
+"""What is nearest to the pointer is ringed, named below the picture, and opened by a click. It needs `reveal` and
+`offerCopy` of the page's own script. Without it, or without a pointer, the tables lead to the same cells.
+"""
+
+
+def height_of(rows: int) -> float:
+    """Of a panel with rows, in inches."""
+    return 1.2 + max(0.36 * rows, 1.0)
+
+
+class Target(NamedTuple):
+    """What lies at ``x``, ``y`` in the units of the axes, and leads to ``anchor``; ``at_s``: where each point is a
+    moment, since the start of the run.
+    """
+
+    x: Floats
+    y: Floats
+    anchor: str
+    said: str
+    at_s: Floats | None
+
+
+class Panel:
+    """Axes with a title, of a height in inches; what is drawn on them leads to where `lead` says."""
+
+    def __init__(self, title: str, x: str, y: str, height: float = 3.4) -> None:
+        self.title = title
+        self.figure, (self.axes,) = panels(1, height)
+        self._targets: list[Target] = []
+        label(self.axes, title, x, y)
+
+    def lead(self, x: Floats | float, y: Floats | float, anchor: str, said: str, at_s: Floats | None = None) -> None:
+        """Let points lead to an entry of the page; one point may be two numbers."""
+        across, up = np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(y))
+        self._targets.append(Target(across.astype(np.float64), up.astype(np.float64), anchor, said, at_s))
+
+    def log(self, which: Literal["x", "y"]) -> None:
+        """A logarithmic axis, where anything is on it: where every estimator was lost, nothing is. Its ticks leave room
+        for their numbers, which stand side by side along x.
+        """
+        axes = self.axes
+        axis, span, least, most = {
+            "x": (axes.xaxis, axes.dataLim.intervalx, axes.dataLim.minposx, 2.0),
+            "y": (axes.yaxis, axes.dataLim.intervaly, axes.dataLim.minposy, 3.5),
+        }[which]
+        if np.isfinite(least):
+            axes.set(**{f"{which}scale": "log"})
+            plain_ticks(axis, (1.0, 2.0, 5.0) if np.log10(span[1] / least) < most else (1.0,))
+
+    def rows(self, names: Sequence[str]) -> None:
+        """A row for each name, the first on top; the names stand level, so that as many as there are can be read."""
+        self.axes.set_ylim(len(names) - 0.5, -0.5)
+        self.axes.set_yticks(range(len(names)), names)
+
+    def legend(self) -> None:
+        """Below the axes, two names in a row."""
+        handles, names = self.axes.get_legend_handles_labels()
+        self.figure.legend(handles, names, loc="outside lower center", ncols=2, frameon=False, fontsize=8)
+
+    def block(self) -> str:
+        """The picture as a line of HTML, with its targets."""
+        image = f'<img alt="{html.escape(self.title)}" src="{inline_png(as_png(self.figure))}">'
+        # Only now that all is drawn is known where.
+        found = [shown for target in self._targets if (shown := self._shown(target))]
+        targets = html.escape(json.dumps(found, separators=(",", ":")))
+        return f'<div class="figure" data-targets="{targets}">{image}</div>'
+
+    def _shown(self, target: Target) -> Sequence[object] | None:
+        """Anchor, words, places from the left and from the top, times; None where nothing of it is in the picture."""
+        places = self.axes.transData.transform(np.column_stack(target[:2])) / self.figure.bbox.size
+        with np.errstate(invalid="ignore"):
+            inside = np.all((places >= 0.0) & (places <= 1.0), axis=1)
+        if not inside.any():
+            return None
+        across, up = np.round(FINE * places[inside]).astype(int).T
+        times = [] if target.at_s is None else [np.round(target.at_s[inside], 2).tolist()]
+        return [target.anchor, target.said, across.tolist(), (int(FINE) - up).tolist(), *times]
+
+
+def group(every: Iterable[Panel]) -> str:
+    """Panels side by side, as many as there is room for: a line of HTML."""
+    return f'<div class="figures">{"".join(panel.block() for panel in every)}</div>'
+
+
+def peaks(values: Floats, most: int) -> NDArray[np.intp]:
+    """Where the greatest value of each of at most ``most`` stretches is: thinned so, a curve keeps its peaks.
+
+    >>> peaks(np.array([1.0, 5.0, 2.0, np.nan, 0.0]), 3)
+    array([1, 2, 4])
+    """
+    step = max(-(-len(values) // most), 1)
+    known = np.where(np.isnan(values), -np.inf, values)
+    stretches = np.pad(known, (0, -len(values) % step), constant_values=-np.inf).reshape(-1, step)
+    places: NDArray[np.intp] = step * np.arange(len(stretches)) + stretches.argmax(axis=1)
+    return places
