@@ -11,12 +11,14 @@ from fusion import FusionError
 
 STYLE = """
 :root { color-scheme: light dark; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem;
+  overflow-wrap: break-word; }
 table { display: block; overflow-x: auto; border-collapse: collapse; font-size: 0.85rem; margin: 0.5rem 0 1.5rem; }
 th, td { border-bottom: 1px solid #8884; padding: 0.25rem 0.6rem; vertical-align: top; }
 th { text-align: left; }
 img { max-width: 100%; background: white; }
 td[style*="right"], td:not(:last-child) { white-space: nowrap; }
+tr > td:first-child { white-space: normal; overflow-wrap: anywhere; min-width: 8rem; }
 code { font-size: 0.9em; overflow-wrap: anywhere; }
 td code { display: block; min-width: 20rem; }
 .figures { display: flex; flex-wrap: wrap; gap: 1rem; align-items: start; }

@@ -67,7 +67,7 @@ def _drawn(material: Material, what: str, title: str, found: Mapping[str, Sequen
     panel = Panel(title, "1 is honest, right of it surer than right", "", height_of(len(shown)))
     panel.axes.axvline(1.0, color="0.5", linewidth=1, zorder=1)
     for row, (name, own) in enumerate(shown.items()):
-        places = row + np.linspace(-0.35, 0.35, len(own) + 2)[1:-1]
+        places = row + np.linspace(-0.3, 0.3, len(own) + 2)[1:-1]
         _draw(panel, plain_colour(material.use(name)), places, own)
         for place, one in zip(places, own, strict=True):
             panel.lead(one.mean, place, material.anchor(one.result), _said(name, what, one))

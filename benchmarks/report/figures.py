@@ -33,7 +33,7 @@ def accuracy(material: Material) -> Iterator[Panel]:
 
 def _cdf(material: Material) -> Panel:
     """How often the error is below a distance; a curve ends at the availability, not at one."""
-    panel = Panel("Error distribution, without faults", "position error, cm, log scale", "share of instants, %", 4.0)
+    panel = Panel("Error distribution, without faults", "position error, cm, log scale", "share of instants, %")
     for name in material.contestants:
         _distribution(panel, material, name)
     panel.log("x")
@@ -86,8 +86,8 @@ def _paired(material: Material) -> Panel:
 
 def over_time(material: Material) -> Iterator[Panel]:
     """Position error over time, run by run; gaps where there was no valid answer."""
-    for run_id in material.scored_runs:
-        panel = Panel(run_id, "time since the start, s", "position error, cm, log scale", 3.8)
+    for place, run_id in enumerate(material.scored_runs):
+        panel = Panel(run_id, "time since the start, s", "position error, cm, log scale")
         for name in material.contestants:
             if (series := material.series.get((run_id, name))) is not None:
                 time_s, error_cm = series.time_s, 100.0 * np.where(series.answers.valid, series.error_m, np.nan)
@@ -97,30 +97,27 @@ def over_time(material: Material) -> Iterator[Panel]:
                 panel.lead(time_s[fewer], error_cm[fewer], anchor, said, time_s[fewer])
         panel.log("y")
         panel.axes.set_ylim(bottom=max(panel.axes.get_ylim()[0], LEAST_CM))
-        panel.legend()
+        if place == 0:
+            panel.legend()
         yield panel
 
 
 def cost(material: Material) -> Iterator[Panel]:
     """Accuracy against processor time, where `fusion bench time` has measured it: lower left is better."""
-    grouped = by_contestant(material.results)
-    panel = Panel(
-        "Accuracy against cost", "processor time per measurement, µs, log scale", f"{material.axis}, log scale"
-    )
-    for name, least_us in material.timing.items():
-        if name not in grouped:
-            continue
+    grouped, x = by_contestant(material.results), "processor time per measurement, µs, log scale"
+    panel = Panel("Accuracy against cost", x, f"{material.axis}, log scale")
+    for rank, name in enumerate(material.contestants, 1):
         score = quantile(np.median(score_matrix(grouped[name], material.metric), axis=1), 0.5)
-        if np.isfinite(score):
-            place = (least_us, material.unit.factor * score)
-            panel.axes.scatter(*place, color=plain_colour(material.use(name)), s=30)
-            panel.axes.annotate(name, place, textcoords="offset points", xytext=(5, 3), fontsize=8)
-            result = nearest(grouped[name], material.metric, score)
-            said = f"{name}: {material.metric} {material.text(score)}, {least_us:.0f} µs"
-            panel.lead(*place, material.anchor(result), said)
+        if name in material.timing and np.isfinite(score):
+            place = (material.timing[name], material.unit.factor * score)
+            panel.axes.scatter(*place, color=plain_colour(material.use(name)), s=30, label=f"{rank} {name}")
+            panel.axes.annotate(str(rank), place, textcoords="offset points", xytext=(4, 3), fontsize=8)
+            said = f"{name}: {material.metric} {material.text(score)}, {place[0]:.0f} µs"
+            panel.lead(*place, material.anchor(nearest(grouped[name], material.metric, score)), said)
     panel.log("x")
     panel.log("y")
     if panel.axes.collections:
+        panel.legend()
         yield panel
 
 

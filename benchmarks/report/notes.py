@@ -24,7 +24,7 @@ NOTES: Mapping[str, str] = {
     ),
     "faults": (
         "Every estimator meets the same damage. ∞: no finite score in at least half of the runs. Below 1 is no "
-        "mistake: a reading that is missing cannot mislead."
+        "mistake: a reading that is missing cannot mislead, and what is drawn anew may fall better."
     ),
     "outages": (
         "Growth: slope of the error over time. Below 1 m again: from the end of the window until the error stays below "
@@ -47,8 +47,9 @@ NOTES: Mapping[str, str] = {
         "are about three times what was claimed, at 0.1 a third of it."
     ),
     "over_time": (
-        "Gaps are instants without a valid answer; errors below 1 cm are not shown. Where a line has more points than "
-        "can be drawn, the greatest of neighbours stands for all of them."
+        "Lines are named below the first panel, and below any where they are pointed at. Gaps are instants without a "
+        "valid answer; errors below 1 cm are not shown. Where a line has more points than can be drawn, the greatest "
+        "of neighbours stands for all of them."
     ),
     "maps": (
         "The best estimator's track, coloured by its error, over the true path; triangles are anchors, contours the "

@@ -17,6 +17,10 @@ from benchmarks.plotting import as_png, label, panels, plain_ticks
 FINE = 1e4
 """Into how many parts width and height of a picture are divided, to say where something is."""
 
+ROW_INCHES, LINE_INCHES = 0.45, 0.17
+LONG_NAME = 26
+"""Letters of which two fit side by side into a legend no more."""
+
 POINTING = """
 function pointAt(figure, targets) {
   const hint = figure.appendChild(document.createElement("small"));
@@ -71,7 +75,7 @@ for (const figure of document.querySelectorAll("[data-targets]")) pointAt(figure
 
 def height_of(rows: int) -> float:
     """Of a panel with rows, in inches."""
-    return 1.2 + max(0.36 * rows, 1.0)
+    return 1.0 + ROW_INCHES * max(rows, 2)
 
 
 class Target(NamedTuple):
@@ -114,14 +118,29 @@ class Panel:
             plain_ticks(axis, (1.0, 2.0, 5.0) if np.log10(span[1] / least) < most else (1.0,))
 
     def rows(self, names: Sequence[str]) -> None:
-        """A row for each name, the first on top; the names stand level, so that as many as there are can be read."""
-        self.axes.set_ylim(len(names) - 0.5, -0.5)
-        self.axes.set_yticks(range(len(names)), names)
+        """A row for each name, the first on top. It stands above its row, for beside it a long one leaves no room: what
+        is drawn of row k belongs to k ± 0.3.
+        """
+        self.axes.set_ylim(len(names) - 0.5, -0.8)
+        self.axes.set_yticks(range(len(names)), [""] * len(names))
+        for row, name in enumerate(names):
+            self.axes.annotate(
+                name,
+                (0.0, row - 0.35),
+                (2, 0),
+                xycoords=self.axes.get_yaxis_transform(),
+                textcoords="offset points",
+                fontsize=8,
+                verticalalignment="bottom",
+                bbox={"color": "white", "alpha": 0.7, "pad": 0.0},
+            )
 
     def legend(self) -> None:
-        """Below the axes, two names in a row."""
+        """Below the axes, which keep their size."""
         handles, names = self.axes.get_legend_handles_labels()
-        self.figure.legend(handles, names, loc="outside lower center", ncols=2, frameon=False, fontsize=8)
+        columns = 1 if max(map(len, names), default=0) > LONG_NAME else 2
+        self.figure.set_figheight(self.figure.get_figheight() + LINE_INCHES * -(-len(names) // columns))
+        self.figure.legend(handles, names, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
 
     def block(self) -> str:
         """The picture as a line of HTML, with its targets."""
