@@ -20,7 +20,7 @@ img { max-width: 100%; background: white; }
 td[style*="right"], td:not(:last-child) { white-space: nowrap; }
 tr > td:first-child { white-space: normal; overflow-wrap: anywhere; min-width: 8rem; }
 code { font-size: 0.9em; overflow-wrap: anywhere; }
-td code { display: block; min-width: 20rem; }
+td code { display: block; min-width: 36rem; }
 .figures { display: flex; flex-wrap: wrap; gap: 1rem; align-items: start; }
 .figure { position: relative; flex: 0 1 21rem; }
 .figure img { display: block; width: 100%; touch-action: manipulation; }

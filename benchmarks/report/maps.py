@@ -24,7 +24,7 @@ def maps(material: Material) -> Iterator[Panel]:
     for run_id in material.scored_runs:
         series, run = material.series.get((run_id, best)), material.run(run_id)
         if series is not None and series.answers.valid.any():
-            panel = Panel(f"{run_id}: {best}", "x, m", "y, m", _height(run.world.bounds))
+            panel = Panel(f"{run_id}: {best}", "x, m", "y, m", _height(run.world.bounds), fits=False)
             _floor(panel, run)
             _track(panel, series)
             _lead(panel, material, series)
