@@ -20,7 +20,7 @@ LINES = ("-", "--", "-.", ":")
 LONGEST_LINE = 2000
 """Points a line is thinned to: a picture shows no more."""
 LEAST_CM = 1.0
-"""Where logarithmic axes of errors begin at the earliest: a run starts where it is told to, with no error."""
+"""Where logarithmic axes of errors begin, unless all are small: a run starts where it is told to, with no error."""
 LEADING = 200
 """Points of a line that lead to their moment: two pixels apart."""
 
@@ -37,7 +37,7 @@ def _cdf(material: Material) -> Panel:
     for name in material.contestants:
         _distribution(panel, material, name)
     panel.log("x")
-    panel.axes.set_xlim(left=max(panel.axes.get_xlim()[0], LEAST_CM))
+    panel.axes.set_xlim(left=_beginning(*panel.axes.get_xlim()))
     panel.axes.set_ylim(0.0, 100.0)
     panel.legend()
     return panel
@@ -96,7 +96,7 @@ def over_time(material: Material) -> Iterator[Panel]:
                 anchor, said = material.anchor(series.result), f"{name}, {run_id}"
                 panel.lead(time_s[fewer], error_cm[fewer], anchor, said, time_s[fewer])
         panel.log("y")
-        panel.axes.set_ylim(bottom=max(panel.axes.get_ylim()[0], LEAST_CM))
+        panel.axes.set_ylim(bottom=_beginning(*panel.axes.get_ylim()))
         if place == 0:
             panel.legend()
         yield panel
@@ -119,6 +119,15 @@ def cost(material: Material) -> Iterator[Panel]:
     if panel.axes.collections:
         panel.legend()
         yield panel
+
+
+def _beginning(low: float, high: float) -> float:
+    """Where an axis of errors begins that would reach from ``low`` to ``high`` [cm].
+
+    >>> _beginning(1e-7, 300.0), _beginning(20.0, 300.0), _beginning(1e-7, 0.5)
+    (1.0, 20.0, 0.005)
+    """
+    return max(low, min(LEAST_CM, high / 100.0))
 
 
 def _style(material: Material, name: str) -> dict[str, Any]:

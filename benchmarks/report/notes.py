@@ -48,8 +48,8 @@ NOTES: Mapping[str, str] = {
     ),
     "over_time": (
         "Lines are named below the first panel, and below any where they are pointed at. Gaps are instants without a "
-        "valid answer; errors below 1 cm are not shown. Where a line has more points than can be drawn, the greatest "
-        "of neighbours stands for all of them."
+        "valid answer; errors below 1 cm are not shown, unless all are small. Where a line has more points than can "
+        "be drawn, the greatest of neighbours stands for all of them."
     ),
     "maps": (
         "The best estimator's track, coloured by its error, over the true path; triangles are anchors, contours the "
