@@ -22,6 +22,13 @@ ROW_INCHES, LINE_INCHES = 0.45, 0.17
 LONG_NAME = 26
 """Letters of which two fit side by side into a legend no more."""
 
+DIGITS = (
+    (0.6, (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)),
+    (2.0, (1.0, 2.0, 5.0)),
+    (np.inf, (1.0,)),
+)
+"""Up to how many decades along x which numbers are written: as many as have room side by side."""
+
 POINTING = """
 function pointAt(figure, targets) {
   const hint = figure.appendChild(document.createElement("small"));
@@ -118,17 +125,16 @@ class Panel:
         self._targets.append(Target(across.astype(np.float64), up.astype(np.float64), anchor, said, at_s))
 
     def log(self, which: Literal["x", "y"]) -> None:
-        """A logarithmic axis, where anything is on it: where every estimator was lost, nothing is. Its ticks leave room
-        for their numbers, which stand side by side along x.
-        """
+        """A logarithmic axis, where anything is on it: where every estimator was lost, nothing is."""
         axes = self.axes
-        axis, span, least, most = {
-            "x": (axes.xaxis, axes.dataLim.intervalx, axes.dataLim.minposx, 2.0),
-            "y": (axes.yaxis, axes.dataLim.intervaly, axes.dataLim.minposy, 3.5),
+        axis, (_, most), least, room = {
+            "x": (axes.xaxis, axes.dataLim.intervalx, axes.dataLim.minposx, 1.0),
+            "y": (axes.yaxis, axes.dataLim.intervaly, axes.dataLim.minposy, 1.75),
         }[which]
         if np.isfinite(least):
             axes.set(**{f"{which}scale": "log"})
-            plain_ticks(axis, (1.0, 2.0, 5.0) if np.log10(span[1] / least) < most else (1.0,))
+            decades = np.log10(most / least) / room
+            plain_ticks(axis, next(digits for upto, digits in DIGITS if decades <= upto))
 
     def rows(self, names: Sequence[str]) -> None:
         """A row for each name, the first on top. It stands above its row, for beside it a long one leaves no room: what
