@@ -11,15 +11,22 @@ from fusion import FusionError
 
 STYLE = """
 :root { color-scheme: light dark; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem;
+  overflow-wrap: break-word; }
 table { display: block; overflow-x: auto; border-collapse: collapse; font-size: 0.85rem; margin: 0.5rem 0 1.5rem; }
 th, td { border-bottom: 1px solid #8884; padding: 0.25rem 0.6rem; vertical-align: top; }
 th { text-align: left; }
 img { max-width: 100%; background: white; }
 td[style*="right"], td:not(:last-child) { white-space: nowrap; }
+tr > td:first-child { white-space: normal; overflow-wrap: anywhere; min-width: 8rem; }
 code { font-size: 0.9em; overflow-wrap: anywhere; }
-td code { display: block; min-width: 20rem; }
-@media (max-width: 50rem) { .figure { overflow-x: auto; } .figure img { max-width: none; zoom: 0.6; } }
+td code { display: block; min-width: 36rem; }
+.figures { display: flex; flex-wrap: wrap; gap: 1rem; align-items: start; }
+.figure { position: relative; flex: 0 1 21rem; }
+.figure img { display: block; width: 100%; touch-action: manipulation; }
+.figure small { display: block; min-height: 3em; font-size: 0.8rem; }
+.figure i { position: absolute; width: 1rem; height: 1rem; margin: -0.5rem; border: 2px solid black; border-radius: 50%;
+  box-sizing: border-box; pointer-events: none; }
 li { margin: 0.4rem 0; }
 summary { cursor: pointer; padding: 0.25rem 0; }
 :target { outline: 2px solid #0072b2; outline-offset: 0.25rem; }
@@ -58,11 +65,6 @@ def data_of(page: str) -> Any:  # noqa: ANN401 - whatever was written
     if not found:
         raise ValueError("the page holds no numbers")
     return json.loads(rest.partition(END)[0])
-
-
-def figure(what: str, picture: bytes) -> str:
-    """A PNG as a block of HTML that stands in Markdown: a parser of Markdown would read its whole address as text."""
-    return f'<div class="figure"><img alt="{html.escape(what)}" src="{inline_png(picture)}"></div>'
 
 
 def inline_png(picture: bytes) -> str:

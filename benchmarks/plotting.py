@@ -71,6 +71,10 @@ def plain(colour: Colour) -> tuple[float, float, float]:
 
 def as_png(figure: Figure) -> bytes:
     """The picture, the same bytes for the same figure and version of matplotlib."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    figure.set_dpi(DOTS_PER_INCH)
+    # Not by `savefig`, which draws everything once more only to lay it out.
+    FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})  # type: ignore[no-untyped-call]
     return buffer.getvalue()

@@ -12,7 +12,7 @@ from benchmarks.runner.definition import CLEAN, TUNE
 from benchmarks.runner.results import Result
 
 SCRIPT = """
-for (const code of document.querySelectorAll("li > code")) {
+function offerCopy(code) {
   const button = document.createElement("button");
   button.textContent = "copy";
   button.onclick = () => {
@@ -21,6 +21,7 @@ for (const code of document.querySelectorAll("li > code")) {
   };
   code.before(button);
 }
+document.querySelectorAll("li > code").forEach(offerCopy);
 function reveal() {
   const entry = document.getElementById(location.hash.slice(1));
   const fold = entry && entry.closest("details");

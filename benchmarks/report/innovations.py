@@ -48,9 +48,14 @@ def mean_nis(fates: FateColumns) -> dict[str, MeanNis]:
     return found
 
 
+def nis_of_cells(material: Material) -> dict[tuple[str, str], dict[str, MeanNis]]:
+    """Of the cells that are shown, by run and contestant."""
+    return {key: mean_nis(series.fates) for key, series in material.series.items()}
+
+
 def innovations(material: Material) -> Sheet:
     """One row for each estimator and sensor, one column for each shown run: a mean outside its band is bold."""
-    found = {key: mean_nis(series.fates) for key, series in material.series.items()}
+    found = nis_of_cells(material)
     head = ("estimator", "sensor", "inside 95 %, median", *material.scored_runs)
     title = "Innovations: mean NIS [band of an honest filter, 95 %]; above: surer of its readings than right"
     return Sheet(title, head, tuple(_rows(material, found)))

@@ -14,6 +14,7 @@ from benchmarks.metrics.deviation import Errors, errors
 from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.instants import Answers, evaluation_instants, match
 from benchmarks.metrics.track import Floats
+from benchmarks.review.frame import Frame
 from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.execute import stored_track
 from benchmarks.runner.plan_verb import STORE
@@ -24,7 +25,7 @@ from benchmarks.runner.time_verb import read_timing
 from benchmarks.statistics.verdict import Comparison
 from benchmarks.table import Unit, unit_of
 from fusion import ParameterError, Ranges
-from fusion.values import seconds
+from fusion.values import NANOSECONDS
 from logs.run import Run
 
 SHOWN_RUNS = 6
@@ -32,17 +33,18 @@ SHOWN_RUNS = 6
 
 
 class Series(NamedTuple):
-    """One cell over its run: ``time_s`` from the first instant, position error [m], infinite without a valid answer."""
+    """One cell over its run, which starts at ``start_ns``: position error [m], infinite without a valid answer."""
 
     result: Result
+    start_ns: int
     instants: Instants
     answers: Answers
     fates: FateColumns
 
     @property
     def time_s(self) -> Floats:
-        """Since the first instant."""
-        return np.array([seconds(int(time_ns - self.instants.time_ns[0])) for time_ns in self.instants.time_ns])
+        """Of the instants since the start of the run: what `fusion review` calls ``--at``."""
+        return (self.instants.time_ns - self.start_ns) / NANOSECONDS
 
     @property
     def error_m(self) -> Floats:
@@ -63,6 +65,7 @@ class Material:
         self.suite, self.results, self.metric = suite, list(results), metric
         self._store = store
         self._runs: dict[str, Run] = {}
+        self._starts_ns: dict[str, int] = {}
 
     @property
     def words(self) -> list[str]:
@@ -73,6 +76,10 @@ class Material:
     def anchor(self, result: Result) -> str:
         """What links to the entry of a cell name."""
         return self._anchors[_ids(result)]
+
+    def use(self, contestant: str) -> str:
+        """The installed name of its estimator, which has the colour."""
+        return next(one.use for one in self.suite.contestants if one.id == contestant)
 
     def anchor_of_all(self, contestant: str) -> str:
         """What links to all cells of a contestant name."""
@@ -156,13 +163,19 @@ class Material:
             self._runs[run_id] = open_run(self.suite.run(run_id), self.suite.folder)
         return self._runs[run_id]
 
+    def _start_ns(self, run_id: str) -> int:
+        if run_id not in self._starts_ns:
+            self._starts_ns[run_id] = Frame.around(self.run(run_id)).start_ns
+        return self._starts_ns[run_id]
+
     def _series(self, result: Result) -> Series:
         cell, rules = result.cell, result.cell.evaluation
         truth = self.run(cell.run.id).truth
         assert truth is not None
         instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
         track, fates = stored_track(cell, self._store)
-        return Series(result, instants, match(instants, track, max_age_s=rules.max_age_s), fates)
+        answers = match(instants, track, max_age_s=rules.max_age_s)
+        return Series(result, self._start_ns(cell.run.id), instants, answers, fates)
 
 
 def _ids(result: Result) -> tuple[str, str, str, int]:

@@ -8,25 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 import fusion
 from benchmarks.metrics.score import quantile
 from benchmarks.metrics.track import Flags, Floats
-from benchmarks.plotting import label, panels, plain_colour, plain_ticks
+from benchmarks.plotting import plain_colour, plain_ticks
 from benchmarks.report.cells import link, nearest
 from benchmarks.report.material import Material
+from benchmarks.report.panel import Panel
 from benchmarks.runner.definition import CLEAN, TEST, TUNE, Contestant
 from benchmarks.runner.results import Result, by_run, score_matrix
 from benchmarks.sheet import Sheet
 from benchmarks.statistics.statistics import log_ratios, mean_interval
 from fusion.plugins import parameters
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 WITHOUT_TUNE = (
     'No run of this suite has split = "tune". Whoever takes the best value from here has chosen it on the runs that it '
@@ -54,6 +51,23 @@ class Sweep(NamedTuple):
     def log_ratios(self) -> Floats:
         """(values, runs): below 0 where a value is better than what it is compared with."""
         return np.array([log_ratios(row, self.scores[self.compared_with]) for row in self.scores])
+
+    @property
+    def ratios(self) -> Floats:
+        """The same as multiples, NaN where one of the two was lost."""
+        return np.exp(np.where(np.isfinite(self.log_ratios), self.log_ratios, np.nan))
+
+    @property
+    def judged(self) -> Flags:
+        """The runs that the means are over: for tests, or all where none is."""
+        return self.is_test if self.is_test.any() else ~self.is_test
+
+    @property
+    def intervals(self) -> tuple[Floats, Floats, Floats]:
+        """Of every value the geometric mean over the judged runs, and the ends of its paired t interval."""
+        found = [mean_interval(row[np.isfinite(row)]) for row in self.log_ratios[:, self.judged]]
+        mean, low, high = (np.exp(np.clip([float(one[k]) for one in found], -50.0, 50.0)) for k in range(3))
+        return mean, low, high
 
     def name(self, place: int) -> str:
         """A value, and whether it is the default."""
@@ -114,8 +128,7 @@ def _linked(material: Material, sweep: Sweep, place: int, of: Flags) -> str:
     text = _told(sweep, place, of)
     if text == "–":
         return text
-    run = int(np.where(of, np.abs(sweep.log_ratios[place]), -1.0).argmax())
-    return link(material, text, nearest(sweep.cells[place][run], material.metric, sweep.scores[place, run]))
+    return link(material, text, _cell(material, sweep, place, _farthest(sweep, place, of)))
 
 
 def _told(sweep: Sweep, place: int, of: Flags) -> str:
@@ -144,28 +157,24 @@ def advice(found: Sequence[Sweep]) -> Iterator[str]:
             yield f"{chosen}; on the {TEST} runs it scores {worth} what {sweep.name(sweep.compared_with)} does."
 
 
-def curves(material: Material, found: Sequence[Sweep]) -> Figure:
+def curves(material: Material, found: Sequence[Sweep]) -> Iterator[Panel]:
     """One panel per parameter."""
-    drawn, every = panels(len(found), 3.6, columns=3)
-    for axes, sweep in zip(every, found, strict=True):
-        _draw(axes, sweep)
-        label(
-            axes, f"{sweep.estimator}: {sweep.parameter}", "value; dotted: the default", f"ratio of {material.metric}"
-        )
-    return drawn
+    for sweep in found:
+        title, y = f"{sweep.estimator}: {sweep.parameter}", f"ratio of {material.metric}, log scale"
+        panel = Panel(title, "value; dotted: the default" if sweep.has_default else "value", y)
+        _draw(panel, sweep)
+        _lead(panel, material, sweep)
+        yield panel
 
 
-def _draw(axes: Axes, sweep: Sweep) -> None:
+def _draw(panel: Panel, sweep: Sweep) -> None:
     """A grey line per run, dashed where it is for tuning; the mean of the test runs with its interval."""
-    places = np.arange(len(sweep.values))
-    ratios = np.exp(np.where(np.isfinite(sweep.log_ratios), sweep.log_ratios, np.nan))
+    axes, places = panel.axes, np.arange(len(sweep.values))
     for run, is_test in enumerate(sweep.is_test.tolist()):
-        axes.plot(places, ratios[:, run], color="0.7", linewidth=1, linestyle="-" if is_test else "--", zorder=1)
-    judged = sweep.is_test if sweep.is_test.any() else ~sweep.is_test
-    found = [mean_interval(row[np.isfinite(row)]) for row in sweep.log_ratios[:, judged]]
-    mean, low, high = (np.exp(np.clip([float(one[k]) for one in found], -50.0, 50.0)) for k in range(3))
+        axes.plot(places, sweep.ratios[:, run], color="0.7", linewidth=1, linestyle="-" if is_test else "--", zorder=1)
+    mean, low, high = sweep.intervals
     colour = plain_colour(sweep.use)
-    if judged.sum() > 1:
+    if sweep.judged.sum() > 1:
         axes.vlines(places, low, high, color=colour, linewidth=2, zorder=2)
     axes.plot(places, mean, color=colour, marker="o", linewidth=2, zorder=3)
     if sweep.has_default:
@@ -175,3 +184,24 @@ def _draw(axes: Axes, sweep: Sweep) -> None:
     axes.set_ylim(min(bottom, 0.8), max(top, 1.25))
     plain_ticks(axes.yaxis, (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 7.0, 8.0, 9.0))
     axes.set_xticks(places, [str(value) for value in sweep.values])
+
+
+def _lead(panel: Panel, material: Material, sweep: Sweep) -> None:
+    """Runs to their own cells, means to the run in which the value makes the greatest difference."""
+    for place in range(len(sweep.values)):
+        value = f"{sweep.estimator}, {sweep.parameter} = {sweep.name(place)}"
+        for run, ratio in enumerate(sweep.ratios[place]):
+            cell = _cell(material, sweep, place, run)
+            panel.lead(place, ratio, material.anchor(cell), f"{value}, {cell.cell.run.id}: {ratio:.2f}×")
+        cell = _cell(material, sweep, place, _farthest(sweep, place, sweep.judged))
+        said = f"{value}: {_told(sweep, place, sweep.judged)}, farthest in {cell.cell.run.id}"
+        panel.lead(place, sweep.intervals[0][place], material.anchor(cell), said)
+
+
+def _farthest(sweep: Sweep, place: int, of: Flags) -> int:
+    """The run in which a value makes the greatest difference."""
+    return int(np.where(of, np.abs(sweep.log_ratios[place]), -1.0).argmax())
+
+
+def _cell(material: Material, sweep: Sweep, place: int, run: int) -> Result:
+    return nearest(sweep.cells[place][run], material.metric, sweep.scores[place, run])

@@ -212,3 +212,13 @@ def contestants(material: Material) -> Sheet:
         for one in material.suite.contestants
     )
     return Sheet("Estimators", ("id", "estimator", "tuned on", "parameters"), rows, prose=True)
+
+
+def damage(material: Material) -> Sheet:
+    """What each fault does, as the suite has it; no rows without any."""
+    rows = tuple(
+        (fault.id, "; ".join(", ".join(f"{key} = {value}" for key, value in one.items()) for one in fault.apply))
+        for fault in material.suite.faults
+        if fault.id != CLEAN
+    )
+    return Sheet("Damage", ("fault", "what it does"), rows, prose=True)

@@ -14,19 +14,21 @@ import numpy as np
 import fusion
 from benchmarks.metrics.credibility import LEAST_SEEDS
 from benchmarks.output import write
-from benchmarks.page import as_html, figure
-from benchmarks.plotting import as_png, require_matplotlib
+from benchmarks.page import as_html
+from benchmarks.plotting import require_matplotlib
 from benchmarks.report import tables
 from benchmarks.report.cells import SCRIPT, counted, entries
 from benchmarks.report.figures import FIGURES
 from benchmarks.report.innovations import innovations
 from benchmarks.report.material import Material
+from benchmarks.report.notes import NOTES
 from benchmarks.report.pairs import deciding, pairs, run_by_run
+from benchmarks.report.panel import POINTING, group
 from benchmarks.report.sensitivity import advice, curves, sensitivity, sweeps
 from benchmarks.runner.compare_verb import stored_results
 from benchmarks.runner.definition import CLEAN, TUNE
 from benchmarks.runner.plan_verb import suite_options
-from benchmarks.runner.results import RANKED_BY, record, require_metric
+from benchmarks.runner.results import RANKED_BY, judged, record, require_metric
 from benchmarks.runner.store import Store
 from benchmarks.sheet import Sheet, as_markdown
 from benchmarks.statistics.within_run import LEAST_INSTANTS, within_run
@@ -34,19 +36,11 @@ from benchmarks.statistics.within_run import LEAST_INSTANTS, within_run
 WITHIN_RUN = ("pos_p75", 0.75)
 """The quantile that is compared within one run; its instants have no other score."""
 
-EXPLAINED = {
-    "summary": (
-        "Left: a curve ends at the availability, since an instant without a valid answer is never reached. Middle: "
-        "verdicts rest on what happens along the grey lines, one per run. Right: an honest dot lies on its grey line "
-        "with 95 %; at 10 errors are three times what the covariance claims."
-    ),
-    "over_time": "Gaps are instants without a valid answer.",
-    "maps": "The best estimator's track, coloured by its error, over the true path; triangles are anchors, "
-    "contours the least error of a fix from one reading of each (Cramér-Rao).",
-    "parameters": "Below 1 is better than the default. A grey line is a run, dashed where it is for tuning; bars are "
-    "the 95 % interval over the test runs.",
-    "cost": "Measured alone on one machine by `fusion bench time`. Lower left is better.",
-}
+ABOUT = (
+    "Errors are horizontal distances to the truth, raw: nothing is aligned. An instant without a valid answer counts "
+    "as infinite. Every number that is a link, and every point of a figure, leads to the cell it comes from, with the "
+    "command that opens Rerun where that cell erred most; a point of a curve or a track to that of its own moment."
+)
 
 
 def report(material: Material, *, limit: bool = False) -> str:
@@ -54,31 +48,28 @@ def report(material: Material, *, limit: bool = False) -> str:
     suite = material.suite
     counts = ((len(suite.runs), "run"), (len(material.contestants), "estimator"), (len(suite.faults) - 1, "fault"))
     made = ", ".join(counted(*count) for count in (*counts, (suite.seeds, "seed")))
-    about = (
-        f"{made}: {counted(len(material.results), 'cell')}. Errors are horizontal distances to the truth, raw: nothing "
-        "is aligned. An instant without a valid answer counts as infinite. Every number that is a link leads to the "
-        "cell it comes from, and to the command that opens Rerun where that cell erred most."
-    )
     parts = [
         f"# {suite.name}",
         *_verdicts(material),
-        about,
+        f"{made}: {counted(len(material.results), 'cell')}. {ABOUT}",
         *_about_runs(material),
-        *map(as_markdown, _sheets(material, limit=limit)),
+        *_sections(material, limit=limit),
+        *_sensitivity(material),
+        *_provenance(material),
+        "**Cells**",
+        entries(material),
     ]
-    if material.has_errors:
-        for name, draw in FIGURES.items():
-            if name == "cost" and not material.timing:
-                continue
-            parts.append(f"{figure(name, as_png(draw(material)))}\n\n{EXPLAINED[name]}")
-    parts += _sensitivity(material)
-    return "\n\n".join([*parts, *_provenance(material), "**Cells**", entries(material)]) + "\n"
+    return "\n\n".join(parts) + "\n"
 
 
 def _about_runs(material: Material) -> Iterator[str]:
     """Which runs do not count, and why."""
     if blind := sorted({result.cell.run.id for result in material.results if not result.cell.content.truth}):
         yield f"Without ground truth, and so without an error: {', '.join(blind)}."
+    counting = {result.cell.run.id for result in judged(material.results)}
+    if material.scored_runs and (len(counting) > len(material.scored_runs) or material.suite.seeds > 1):
+        named = ", ".join(material.scored_runs)
+        yield f"Curves over instants, maps and mean NIS are of the first seed of the first runs that count: {named}."
     tune = [run.id for run in material.suite.runs if run.split == TUNE]
     if len(tune) == len(material.suite.runs):
         yield "**All runs are for tuning**: parameters may have been chosen on what they are scored on here."
@@ -94,7 +85,7 @@ def as_page(material: Material, *, limit: bool = False) -> bytes:
     require_matplotlib()
     clean = [result for result in material.results if result.cell.fault.id == CLEAN]
     page = report(material, limit=limit)
-    return as_html(material.suite.name, page, SCRIPT, record(material.suite, clean))
+    return as_html(material.suite.name, page, SCRIPT + POINTING, record(material.suite, clean))
 
 
 def _verdicts(material: Material) -> Iterator[str]:
@@ -122,26 +113,50 @@ def _within_the_run(material: Material) -> list[str]:
     return [within_run(best, other, errors, *WITHIN_RUN).sentence for other in others]
 
 
-def _sheets(material: Material, *, limit: bool) -> Iterator[Sheet]:
-    yield tables.leaderboard(material)
+def _sections(material: Material, *, limit: bool) -> Iterator[str]:
+    """Who is better, how honest all are, where and when they err, what it costs, and what breaks them."""
+    yield _table(tables.leaderboard(material), "leaderboard")
     if material.comparison is not None:
-        yield pairs(material, material.comparison)
-        yield run_by_run(material)
-    predicted = innovations(material)
-    if predicted.rows:
-        yield predicted
+        yield _table(pairs(material, material.comparison), "pairs")
+    yield from _figure(material, "accuracy")
+    if material.comparison is not None:
+        yield as_markdown(run_by_run(material))
+    yield from _figure(material, "consistency")
+    yield from _known(innovations(material), "innovations")
+    yield from _figure(material, "over_time")
+    yield from _figure(material, "maps")
+    yield from _known(tables.moments(material))
+    yield from _known(tables.lost(material))
+    yield from _figure(material, "cost")
     if limit and material.scored_runs:
-        yield tables.limits(material)
-        yield tables.fixes(material)
+        yield as_markdown(tables.limits(material))
+        yield as_markdown(tables.fixes(material))
     if len(material.suite.faults) > 1:
-        yield tables.faults(material)
-        if (outages := tables.outages(material)).rows:
-            yield outages
-        if material.suite.seeds >= LEAST_SEEDS and material.scored_runs:
-            yield tables.credibility(material)
-    for found in (tables.moments(material), tables.lost(material)):
-        if found.rows:
-            yield found
+        yield from _under_faults(material)
+
+
+def _under_faults(material: Material) -> Iterator[str]:
+    yield _table(tables.faults(material), "faults")
+    yield from _known(tables.outages(material), "outages")
+    if material.suite.seeds >= LEAST_SEEDS and material.scored_runs:
+        yield _table(tables.credibility(material), "credibility")
+
+
+def _table(sheet: Sheet, name: str = "") -> str:
+    """A table with what there is to know of it."""
+    return as_markdown(sheet) + (f"\n\n{NOTES[name]}" if name else "")
+
+
+def _known(sheet: Sheet, name: str = "") -> Iterator[str]:
+    """The same, where it has rows."""
+    if sheet.rows:
+        yield _table(sheet, name)
+
+
+def _figure(material: Material, name: str) -> Iterator[str]:
+    """Its panels, where there is anything to draw."""
+    if material.has_errors and (panels := list(FIGURES[name](material))):
+        yield f"{group(panels)}\n\n{NOTES[name]}"
 
 
 def _sensitivity(material: Material) -> Iterator[str]:
@@ -150,13 +165,14 @@ def _sensitivity(material: Material) -> Iterator[str]:
     if found:
         yield as_markdown(sensitivity(material, found))
         yield "\n".join(f"- {sentence}" for sentence in advice(found))
-        yield f"{figure('parameters', as_png(curves(material, found)))}\n\n{EXPLAINED['parameters']}"
+        yield f"{group(curves(material, found))}\n\n{NOTES['parameters']}"
 
 
 def _provenance(material: Material) -> Iterator[str]:
     command = shlex.join(["fusion", "bench", "run", *material.words])
     yield as_markdown(tables.provenance(material))
     yield as_markdown(tables.contestants(material))
+    yield from _known(tables.damage(material))
     yield (
         f"fusion {fusion.__version__}, numpy {np.__version__}, Python {platform.python_version()}. Every cell is made "
         f"again by `{command}`; `fusion bench verify` computes a sample anew and compares it to the bit."

@@ -29,6 +29,9 @@ def command(result: Result, suite: Sequence[str]) -> str:
 
 
 def worst_moments(results: Sequence[Result], count: int = 10) -> list[Result]:
-    """The cells without faults that hold the ``count`` worst, of the runs that count."""
+    """The cells without faults that hold the ``count`` worst, of the runs that count; of several seeds the worst."""
     clean = [one for one in judged(results) if one.cell.fault.id == CLEAN and one.worst_at_s is not None]
-    return sorted(clean, key=lambda one: -one.metrics.get("pos_max", np.nan))[:count]
+    found: dict[tuple[str, str], Result] = {}
+    for one in sorted(clean, key=lambda one: -one.metrics.get("pos_max", np.nan)):
+        found.setdefault((one.cell.run.id, one.cell.contestant.id), one)
+    return list(found.values())[:count]
