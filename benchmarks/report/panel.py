@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import re
 from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
@@ -84,6 +85,11 @@ for (const figure of document.querySelectorAll("[data-targets]")) pointAt(figure
 def height_of(rows: int) -> float:
     """Of a panel with rows, in inches."""
     return 1.0 + ROW_INCHES * max(rows, 2)
+
+
+def without_targets(text: str) -> str:
+    """A report whose pictures lead nowhere, for a page without `POINTING`."""
+    return re.sub(r' data-targets="[^"]*"', "", text)
 
 
 class Target(NamedTuple):

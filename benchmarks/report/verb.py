@@ -23,7 +23,7 @@ from benchmarks.report.innovations import innovations
 from benchmarks.report.material import Material
 from benchmarks.report.notes import NOTES
 from benchmarks.report.pairs import deciding, pairs, run_by_run
-from benchmarks.report.panel import POINTING, group
+from benchmarks.report.panel import POINTING, group, without_targets
 from benchmarks.report.sensitivity import advice, curves, sensitivity, sweeps
 from benchmarks.runner.compare_verb import stored_results
 from benchmarks.runner.definition import CLEAN, TUNE
@@ -196,7 +196,7 @@ def run(arguments: argparse.Namespace) -> int:
     material = Material(suite, results, Store(arguments.store), arguments.metric)
     targets = {}
     if arguments.markdown:
-        targets[arguments.markdown] = report(material, limit=arguments.limit).encode()
+        targets[arguments.markdown] = without_targets(report(material, limit=arguments.limit)).encode()
     if arguments.html or not arguments.markdown:
         targets[arguments.html or Path(f"{suite.name}.html")] = as_page(material, limit=arguments.limit)
     for path, content in targets.items():

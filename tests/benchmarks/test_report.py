@@ -186,6 +186,15 @@ def test_contestants_are_ordered_by_the_median_of_what_is_compared(material):
     assert material.comparison.letters.keys() == {"wheels", "radio"}
 
 
+def test_markdown_has_the_same_figures_but_nothing_to_click(place, tmp_path):
+    target = tmp_path / "report.md"
+    words = ["bench", "report", str(place / "suite.toml"), "--store", str(place / "store"), "--markdown", str(target)]
+    assert main(words) == 0
+    text = target.read_text()
+    assert "data:image/png" in text
+    assert "data-targets" not in text
+
+
 def test_command_writes_one_file_that_needs_no_network(place, tmp_path, capsys):
     target = tmp_path / "page.html"
     words = ["bench", "report", str(place / "suite.toml"), "--store", str(place / "store"), "--html", str(target)]
