@@ -13,7 +13,7 @@ from benchmarks.runner.definition import RunSource
 from benchmarks.runner.store import Store, key_of, to_json
 from fusion import SuiteError, World
 from fusion.values import nanoseconds
-from logs.reader import read_run
+from logs.reader import read_run, read_world
 from logs.rosbag import read_bag
 from logs.run import Run, TruthTrack
 from sensors.simulation.scenario import load_scenario, scenario_text
@@ -48,6 +48,14 @@ def open_run(source: RunSource, folder: Path) -> Run:
         topics = tuple(sorted(source.topics.items()))
         return _bag(path, path.stat().st_mtime_ns, folder / source.world, topics, source.truth_to_map)
     return _read(path, path.stat().st_mtime_ns)
+
+
+def open_world(source: RunSource, folder: Path) -> World:
+    """The world of the run, without the run where that can be; raises as `open_run`."""
+    if source.scenario is not None:
+        return load_scenario(scenario_of(source.scenario, folder)).world
+    path = place_of(source, folder)
+    return read_world(path) if source.world is None else World.load(folder / source.world)
 
 
 @lru_cache(maxsize=KEPT_RUNS)
