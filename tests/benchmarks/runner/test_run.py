@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from benchmarks.metrics.archive import from_bytes
 from benchmarks.metrics.instants import evaluation_instants, match
 from benchmarks.metrics.score import errors
 from benchmarks.prior import begin_ns
+from benchmarks.runner import reference
 from benchmarks.runner.definition import Contestant, load_suite
 from benchmarks.runner.execute import carry_out, faulty_run, stored_track
 from benchmarks.runner.export_verb import as_csv
@@ -111,6 +113,25 @@ def test_another_evaluation_scores_old_tracks_again_without_an_estimator(suite, 
     todo = missing(cells_of(stricter, store), store)
     assert (len(todo.estimates), len(todo.scores)) == (0, 8)
     assert len(run_suite(stricter, store, workers=1)) == 8
+
+
+@pytest.mark.parametrize("reading", ["causal", "interp"])
+def test_scoring_anew_opens_no_run_and_says_the_same(tmp_path, monkeypatch, reading):
+    text = SUITE.replace("paper_", "").replace("seeds = 2", f'eval = {{ reading = "{reading}" }}')
+    late = fault('kind = "kidnap", from_s = 5.0, until_s = 9.0')
+    (tmp_path / "dense.toml").write_text(text.replace("[[estimators]]", late, 1), encoding="utf-8")
+    store = Store(tmp_path / "store")
+    cells = cells_of(load_suite(tmp_path / "dense.toml"), store)
+    for cell in cells:
+        carry_out((cell, store.folder))
+    expected = digests(read_results(cells, store))
+    assert all(metrics["availability"] > 0.9 for *_, metrics in expected)
+    shutil.rmtree(store.folder / "scores")
+    monkeypatch.setattr("benchmarks.runner.reference.open_run", lambda *_: pytest.fail("the truth is in the store"))
+    monkeypatch.setattr("benchmarks.runner.execute.open_run", lambda *_: pytest.fail("the estimates are in the store"))
+    reference._read.cache_clear()
+    assert [carry_out((cell, store.folder)) for cell in cells] == [status for _, status, *_ in expected]
+    assert digests(read_results(cells, store)) == expected
 
 
 def test_interpolated_evaluation_is_another_score_of_the_same_estimates(tmp_path):
@@ -381,6 +402,16 @@ def test_damaged_track_is_told_not_traced(suite, tmp_path):
         path.write_bytes(broken)
         with pytest.raises(FusionError, match="is damaged"):
             stored_track(cell, store)
+
+
+def test_damaged_truth_is_told_not_traced(suite, tmp_path):
+    store, cell = Store(tmp_path / "store"), cells_of(suite, Store(tmp_path / "store"))[0]
+    carry_out((cell, store.folder))
+    (path,) = store.folder.glob("references/*/*/truth.npz")
+    path.write_bytes(path.read_bytes()[:-100])
+    reference._read.cache_clear()
+    with pytest.raises(FusionError, match=r"truth\.npz: is damaged"):
+        reference.reference_of(cell, store)
 
 
 def test_missing_suite_is_one_sentence(tmp_path):
