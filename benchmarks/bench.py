@@ -16,7 +16,7 @@ from benchmarks.metrics.score import pool
 from benchmarks.output import write_json
 from benchmarks.progress import Progress, progress_bar
 from benchmarks.workers import Loss, compute
-from fusion import LogError, ParameterError
+from fusion import LogError, ParameterError, World
 from fusion.errors import did_you_mean
 from fusion.options import parse_value
 
@@ -59,18 +59,34 @@ def _lost(cell: Cell, _: Loss) -> Score:
 
 def check(runs: Sequence[Path], estimators: Sequence[str], settings: Settings) -> None:
     """Refuse what is missing or misspelt."""
+    require_estimators(estimators)
+    for path in runs:
+        require_log(path)
+    if settings:
+        require_settings(settings, estimators, cached_run(runs[0]).world)
+
+
+def require_log(path: Path) -> None:
+    """Raises `LogError` where no file is."""
+    if not path.is_file():
+        raise LogError(f"{path}: no such file; give an MCAP log (`fusion simulate` makes one)")
+
+
+def require_estimators(estimators: Sequence[str]) -> None:
+    """Raises `PluginError` for one that is not installed."""
     for name in estimators:
         if name not in fusion.names():
             fusion.load(name)
-    for path in runs:
-        if not path.is_file():
-            raise LogError(f"{path}: no such file; give an MCAP log (`fusion simulate` makes one)")
+
+
+def require_settings(settings: Settings, estimators: Sequence[str], world: World) -> None:
+    """Raises `ParameterError` for parameters that an estimator refuses, or of one that is not chosen."""
     for name, options in settings.items():
         if name not in estimators:
             raise ParameterError(
                 f"--set {name}: this estimator is not among the chosen ones; {did_you_mean(name, estimators)}"
             )
-        fusion.build(name, cached_run(runs[0]).world, options)
+        fusion.build(name, world, options)
 
 
 def pooled(scores: Sequence[Score]) -> list[Score]:

@@ -129,10 +129,13 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     >>> did_you_mean("zzz", ["ekf", "particle"])
     'known: ekf, particle'
     """
+    candidates = sorted(known)
+    near = nearest(name, candidates)
+    return f"known: {', '.join(candidates) or 'none'}" if near is None else f"did you mean {near!r}?"
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The one of ``known`` that ``name`` was probably meant to be."""
     import difflib
 
-    candidates = sorted(known)
-    near = difflib.get_close_matches(name, candidates, n=1, cutoff=0.6)
-    if near:
-        return f"did you mean {near[0]!r}?"
-    return f"known: {', '.join(candidates) or 'none'}"
+    return next(iter(difflib.get_close_matches(name, sorted(known), n=1, cutoff=0.6)), None)

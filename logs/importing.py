@@ -62,7 +62,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="a log (*.mcap), or a folder for one log per run",
     )
-    bag = parser.add_argument_group("rosbag only")
+    bag_options(parser.add_argument_group("rosbag only"))
+
+
+def bag_options(bag: argparse._ArgumentGroup) -> None:
+    """What a bag does not say by itself, for every verb that takes one."""
     bag.add_argument("--world", metavar="WORLD.toml", type=Path, help="the anchors and the robot")
     bag.add_argument(
         "--topic",
@@ -82,15 +86,20 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Import and list what was written."""
+    written = import_recordings(arguments.kind, arguments.folder, arguments.output, **given_options(arguments))
+    for path in written:
+        sys.stdout.write(f"{path}\n")
+    return 0
+
+
+def given_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Those of `bag_options` that were given, by the names `logs.rosbag.recordings` has for them."""
     given = {
         "world": arguments.world,
         "topics": _topics(arguments.topic),
         "truth_to_map": arguments.truth_to_map,
     }
-    options = {name: value for name, value in given.items() if value}
-    for path in import_recordings(arguments.kind, arguments.folder, arguments.output, **options):
-        sys.stdout.write(f"{path}\n")
-    return 0
+    return {name: value for name, value in given.items() if value}
 
 
 def _topics(texts: Sequence[str]) -> dict[str, str]:

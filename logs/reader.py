@@ -86,6 +86,13 @@ def _world(path: Path, contents: _Contents) -> World:
         raise LogError(f"{path}: the world stored in it cannot be read ({error}); record or import it again") from error
 
 
+def read_world(path: Path) -> World:
+    """The world of the log at ``path``, which stands before its first message; raises as `read_run`."""
+    walk = Walk(path)
+    next(iter(walk), None)
+    return _world(path, _Contents(walk.metadata.get(RUN_RECORD, {})))
+
+
 def holds_run(path: Path) -> bool:
     """Whether the file is a log of ours: it says so before its first message. Raises `LogError` for no MCAP file."""
     walk = Walk(path)

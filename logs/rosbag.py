@@ -62,9 +62,14 @@ def recordings(
     truth_to_map: Sequence[float] = TRUTH_IS_MAP,
 ) -> Iterator[Recording]:
     """The one run of a bag, as `fusion import rosbag` wants it; raises as `read_bag`."""
-    if world is None:
+    yield read_recording(bag, need_world(world), topics, truth_to_map=truth_to_map)
+
+
+def need_world(path: Path | None) -> World:
+    """The world in a file; raises `ParameterError` when none is given, `WorldError` for one that cannot be read."""
+    if path is None:
         raise ParameterError("a bag does not say where its anchors are: give --world WORLD.toml (docs/world.md)")
-    yield read_recording(bag, World.load(world), topics, truth_to_map=truth_to_map)
+    return World.load(path)
 
 
 def read_recording(

@@ -67,6 +67,11 @@ def apply_faults(run: Run, faults: Sequence[Fault], *, suite_seed: int, fault_id
     """``run`` with all ``faults``, which together are called ``fault_id``, in the order given; ``seed`` counts the
     repetitions. Raises `ParameterError` for a topic, source or wheel that the run does not have.
     """
+    return struck(run, faults, suite_seed=suite_seed, fault_id=fault_id, seed=seed).told()
+
+
+def struck(run: Run, faults: Sequence[Fault], *, suite_seed: int, fault_id: str, seed: int) -> Tape:
+    """The columns of ``run`` with the faults written into them; of what `apply_faults` does, all that it can refuse."""
     tape = Tape(run)
     struck: Counter[str] = Counter()
     for fault in faults:
@@ -78,7 +83,7 @@ def apply_faults(run: Run, faults: Sequence[Fault], *, suite_seed: int, fault_id
             fault.strike(tape, random)
         except ParameterError as error:
             raise ParameterError(f"fault {fault_id!r} ({fault.kind}) on run {run.name!r}: {error}") from error
-    return tape.told()
+    return tape
 
 
 def outages(faults: Sequence[Fault]) -> Windows:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fusion import Gyro, MotorCommand, Odometry, ParameterError, Ranges, WheelTicks, WifiScan
+from fusion.errors import nearest
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -55,10 +56,9 @@ class Rows:
         run does not have.
         """
         if topic not in self.topic:
-            known = ", ".join(sorted(set(map(str, self.topic)))) or "no measurements at all"
-            raise ParameterError(f"the run has no topic {topic!r}; it has {known}")
+            raise ParameterError(f"the run has no topic {topic!r}; {it_has(topic, sorted(set(map(str, self.topic))))}")
         if source and source not in self.sources(topic):
-            raise ParameterError(f"the run has no {source!r} on {topic}; it has {', '.join(self.sources(topic))}")
+            raise ParameterError(f"the run has no {source!r} on {topic}; {it_has(source, self.sources(topic))}")
         chosen = (self.topic == topic) & self.within(windows)
         return np.asarray(chosen & (self.source == source)) if source else chosen
 
@@ -67,3 +67,9 @@ class Rows:
         drawn, rows = np.zeros(len(self.kept)), self.topic == topic
         drawn[rows] = sample(int(rows.sum()))
         return drawn
+
+
+def it_has(name: str, known: Sequence[str]) -> str:
+    """The end of a message about a ``name`` that a run does not have: those it has, and which was probably meant."""
+    near = nearest(name, known)
+    return f"it has {', '.join(known) or 'no measurements at all'}" + (f"; did you mean {near!r}?" if near else "")

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.faults.rows import TOPICS, Floats, Rows
+from benchmarks.faults.rows import TOPICS, Floats, Rows, it_has
 from benchmarks.prior import begin_ns
 from fusion import (
     Gyro,
@@ -64,7 +64,7 @@ class Tape:
         """Where to find ``source``: readings for an anchor, else messages; raises `ParameterError` for neither."""
         anchors, sensors = self.readings.sources(topic), self.messages.sources(topic)
         if source and sensors and source not in anchors + sensors:
-            raise ParameterError(f"the run has no {source!r} on {topic}; it has {', '.join(anchors + sensors)}")
+            raise ParameterError(f"the run has no {source!r} on {topic}; {it_has(source, anchors + sensors)}")
         return self.readings if source in anchors else self.messages
 
     def _rows(self, topics: Sequence[str], sources: Sequence[str], messages: NDArray[np.int64]) -> Rows:

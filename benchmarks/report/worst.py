@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -25,7 +24,7 @@ def command(result: Result, suite: Sequence[str]) -> str:
     words += ["--seed", str(cell.seed)] if cell.seed else []
     made = shlex.join([*words, "-o", log])
     use, params = cell.contestant.use, cell.contestant.params
-    return f"{made} && {review_command(Path(log), use, result.worst_at_s, params=params, seed=cell.seed)}"
+    return f"{made} && {review_command([log], use, result.worst_at_s, params=params, seed=cell.seed)}"
 
 
 def worst_moments(results: Sequence[Result], count: int = 10) -> list[Result]:

@@ -64,8 +64,9 @@ def draw_axes(canvas: Canvas, axes: CdfAxes) -> None:
     columns = [error * WIDTH / axes.error_max_m for error in across]
     grid = [[(x, 0.0), (x, 1.0)] for x in columns] + [[(0.0, y), (WIDTH, y)] for y in (0.0, *SHARES, 1.0)]
     canvas.style(["cdf", "grid"], rr.LineStrips2D(grid, colors=[(*WALL, 120)], radii=[-0.5], draw_order=-20))
-    places = [(x, -0.03) for x in columns] + [(-0.09, y + 0.03) for y in SHARES]
-    texts = [f"{error:g} m" for error in across] + [f"{100 * y:.0f} %" for y in SHARES]
+    places = [(x, -0.03) for x in columns] + [(-0.12, y + 0.03) for y in SHARES]
+    # The unit stands in the title: in a small window the ticks would run into one another.
+    texts = [f"{error:g}" for error in across] + [f"{100 * y:.0f} %" for y in SHARES]
     look = {"colors": [(*TRUTH, STRONG)], "radii": [-0.1], "labels": texts, "show_labels": True}
     canvas.style(["cdf", "ticks"], rr.Points2D(places, **look))
 

@@ -19,7 +19,7 @@ from benchmarks.metrics.track import Floats, Whole
 from benchmarks.review.columns import DrawnTrack, EstimateColumns
 from benchmarks.review.events import Events, States, events, states
 from benchmarks.table import ranked
-from fusion import Reason
+from fusion import Decision, Reason
 from logs.run import Run
 
 SHOWN = 6
@@ -104,7 +104,8 @@ class Drawing:
     @cached_property
     def gates(self) -> bool:
         """Whether it listens to the radio at all, so that there is a weight to show; of a ghost none is shown."""
-        return not self.ghost and not bool(self.fates.met(Reason.KIND_NOT_CONSUMED).all())
+        unheard = self.fates.met(Reason.KIND_NOT_CONSUMED) | self.fates.met(Decision.LATE)  # which may be of anything
+        return not self.ghost and not bool(unheard.all())
 
     @cached_property
     def tells_nis(self) -> bool:

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import fusion
 from benchmarks.arguments import at_least_one, not_negative, since_start
-from benchmarks.bench import Settings, check, parse_settings
-from benchmarks.cell import Cell, Score, cached_run, score_lane
+from benchmarks.bench import Settings, parse_settings, require_estimators, require_settings
+from benchmarks.cell import Cell, Score, score_lane
 from benchmarks.clouds import CloudWatch
 from benchmarks.lane import Lane, run_lane
 from benchmarks.output import require_place
@@ -25,6 +25,7 @@ from benchmarks.review.invocation import review_command
 from benchmarks.review.moments import Moment, worst_moments
 from benchmarks.review.picture import render
 from benchmarks.review.scene import SUFFIX, write_scene
+from benchmarks.review.subject import own_log, remarks, subject, subject_options, words
 from benchmarks.review.viewer import has_display, open_viewer, require_rerun, serve_web
 from fusion import ParameterError, ViewerError
 from logs.run import Run
@@ -45,7 +46,7 @@ class Review(NamedTuple):
 
 
 def review(
-    run: Path,
+    run: Path | Run,
     *,
     estimators: Sequence[str] | None = None,
     settings: Settings | None = None,
@@ -57,7 +58,8 @@ def review(
     reject_s: Sequence[float] = (),
     seed: int = 0,
 ) -> Review:
-    """Run the estimators (None: all installed), with the parameters ``settings``, over ``run`` and draw them: into
+    """Run the estimators (None: all installed), with the parameters ``settings``, over ``run`` (a log of ours, or what
+    was read from anything else) and draw them: into
     ``save`` (one file ``OUT.rrd``, or a folder of layers), into the picture ``png``, or, given neither and no
     ``worst``, in the viewer. The time cursor of picture and viewer stands ``at_s`` after the start (None: at the end).
 
@@ -76,10 +78,12 @@ def review(
         require_place(png)
     names = tuple(dict.fromkeys(fusion.names() if estimators is None else estimators))
     settings = settings or {}
-    check([run], names, settings)
-    recorded = cached_run(run)
+    require_estimators(names)
+    recorded = run if isinstance(run, Run) else own_log(run)
+    require_settings(settings, names, recorded.world)
     if worst and recorded.truth is None:
-        raise ParameterError(f"--worst: {run} holds no ground truth, so no moment is worse than another; leave it out")
+        told = f"{recorded.path} holds no ground truth, so no moment is worse than another; leave it out"
+        raise ParameterError(f"--worst: {told}")
     if at_s is not None:
         require_within(recorded, at_s, "--at")
     chosen = {name: settings.get(name, {}) for name in names}
@@ -122,7 +126,7 @@ def _worst(run: Run, lanes: Sequence[Lane], scores: Sequence[Score], count: int)
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion review``."""
-    parser.add_argument("run", type=Path, metavar="RUN", help="an MCAP log")
+    subject_options(parser)
     parser.add_argument("--estimators", metavar="A,B", help="names, separated by commas; all installed by default")
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME.KEY=VALUE", help="a parameter of an estimator; repeatable"
@@ -155,10 +159,12 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.web and arguments.save is not None and arguments.save.suffix != SUFFIX:
         # The web viewer forgets the layout when a second file follows the one that brings it.
         raise ParameterError(f"--web shows one file, not a folder of layers; give --save {arguments.save}{SUFFIX}")
-    settings = parse_settings(arguments.set)
+    settings, recorded = parse_settings(arguments.set), subject(arguments)
+    for remark in remarks(recorded):
+        sys.stderr.write(f"fusion review: {remark}\n")
     with tempfile.TemporaryDirectory(prefix=PREFIX) as folder:
         made = review(
-            arguments.run,
+            recorded,
             estimators=None if arguments.estimators is None else arguments.estimators.split(","),
             settings=settings,
             save=arguments.save or (Path(folder, SCENE) if arguments.web else None),
@@ -171,14 +177,14 @@ def run(arguments: argparse.Namespace) -> int:
         )
         for written in ([] if arguments.save is None else made.files) + [arguments.png] * (arguments.png is not None):
             sys.stdout.write(f"{written}\n")
-        sys.stdout.writelines(told(made.moments, arguments.run, settings, arguments.seed))
+        sys.stdout.writelines(told(made.moments, [*words(arguments)], settings, arguments.seed))
         if arguments.web:
             _serve(made.files, arguments.at)
     return 0
 
 
-def told(moments: Sequence[Moment], run: Path, settings: Settings, seed: int) -> list[str]:
-    """The worst moments as lines: what, why, and how to look at it."""
+def told(moments: Sequence[Moment], run: Sequence[str], settings: Settings, seed: int) -> list[str]:
+    """The worst moments as lines: what, why, and how to look at it; ``run``: the words that name it."""
     lines = []
     for moment in moments:
         error = f"{moment.error_m:.2f} m" if math.isfinite(moment.error_m) else "no answer"

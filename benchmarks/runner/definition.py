@@ -159,8 +159,11 @@ class Suite:
         return builtin_suites().get(self.path.stem) == self.path
 
     def run(self, run_id: str) -> RunSource:
-        """The run of that id."""
-        return next(run for run in self.runs if run.id == run_id)
+        """The run of that id; raises `SuiteError`."""
+        known = {run.id: run for run in self.runs}
+        if run_id not in known:
+            raise SuiteError(f"the suite has no run {run_id!r}; {did_you_mean(run_id, known)}")
+        return known[run_id]
 
 
 def builtin_suites() -> dict[str, Path]:

@@ -20,6 +20,7 @@ from benchmarks.review.frame import Frame
 from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.judge import judge
 from benchmarks.runner.plan import Cell, read_faults
+from benchmarks.runner.reference import reference_of
 from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store, to_json
 from benchmarks.workers import Limits, Loss, compute
@@ -110,22 +111,22 @@ def stored_track(cell: Cell, store: Store) -> tuple[Track, FateColumns]:
 
 def score(cell: Cell, store: Store) -> str:
     """Judge the estimate in the store, unless that was done; answers the status."""
-    if not store.has("scores", cell.score_key):
-        made = store.read_json("estimates", cell.estimate_key, "result.json")
-        track, fates = stored_track(cell, store)
-        judged = judge(cell, track)
-        measured = {} if judged is None else judged.metrics
-        said = (measured.get("availability", math.nan), measured.get("pos_p50", math.nan))
-        status = made["ended"] if made["error"] else status_of(track, *said)
-        measured |= innovation_metrics(fates)
-        numbers = {key: _finite(value) for key, value in measured.items()}
-        found = {
-            "status": status,
-            "metrics": numbers,
-            "worst_at_s": None if judged is None else judged.worst_at_s(made.get("start_ns")),
-        }
-        store.write("scores", cell.score_key, {"result.json": to_json(found)})
-    return str(store.read_json("scores", cell.score_key, "result.json")["status"])
+    if store.has("scores", cell.score_key):
+        return str(store.read_json("scores", cell.score_key, "result.json")["status"])
+    made = store.read_json("estimates", cell.estimate_key, "result.json")
+    track, fates = stored_track(cell, store)
+    judged = judge(cell, track, reference_of(cell, store))
+    measured = {} if judged is None else judged.metrics
+    said = (measured.get("availability", math.nan), measured.get("pos_p50", math.nan))
+    status = str(made["ended"]) if made["error"] else status_of(track, *said)
+    measured |= innovation_metrics(fates)
+    found = {
+        "status": status,
+        "metrics": {key: _finite(value) for key, value in measured.items()},
+        "worst_at_s": None if judged is None else judged.worst_at_s(made.get("start_ns")),
+    }
+    store.write("scores", cell.score_key, {"result.json": to_json(found)})
+    return status
 
 
 def _finite(value: float) -> float | str | None:

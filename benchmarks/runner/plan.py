@@ -46,29 +46,17 @@ def cells_of(suite: Suite, store: Store) -> list[Cell]:
     made = {contestant.id: contestant_spec(contestant) for contestant in suite.contestants}
     for fault in suite.faults:
         read_faults(fault)
+    folder, rules = suite.folder, asdict(suite.evaluation)
     cells = []
     for run in suite.runs:
-        content = content_of(run, suite.folder, store)
+        content = content_of(run, folder, store)
+        judged = {"truth": content.truth, "evaluation": rules, "metrics": METRICS_VERSION}
         for fault, contestant, seed in product(suite.faults, suite.contestants, range(suite.seeds)):
             spec = {**made[contestant.id], **run_spec(suite, run, fault, content), "seed": seed}
-            cells.append(_cell(suite, run, contestant, fault, seed, content, key_of(spec)))
+            key = key_of(spec)
+            drawn = (run, contestant, fault, seed, suite.seed, suite.evaluation, folder, content)
+            cells.append(Cell(*drawn, key, key_of({"estimate": key, **judged})))
     return cells
-
-
-def _cell(
-    suite: Suite,
-    run: RunSource,
-    contestant: Contestant,
-    fault: FaultSet,
-    seed: int,
-    content: Content,
-    estimate_key: str,
-) -> Cell:
-    judged = {"truth": content.truth, "evaluation": asdict(suite.evaluation), "metrics": METRICS_VERSION}
-    score_key = key_of({"estimate": estimate_key, **judged})
-    return Cell(
-        run, contestant, fault, seed, suite.seed, suite.evaluation, suite.folder, content, estimate_key, score_key
-    )
 
 
 def contestant_spec(contestant: Contestant) -> dict[str, object]:

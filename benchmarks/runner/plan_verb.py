@@ -9,6 +9,7 @@ from pathlib import Path
 
 from benchmarks.runner.definition import load_suite
 from benchmarks.runner.plan import cells_of, missing
+from benchmarks.runner.refusals import refuse_impossible
 from benchmarks.runner.store import Store
 
 STORE = Path("fusion-bench")
@@ -36,6 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     suite, store = load_suite(arguments.suite), Store(arguments.store)
     cells = cells_of(suite, store)
     open_cells = missing(cells, store)
+    refuse_impossible(open_cells.estimates)
     counts = {
         "suite": suite.name,
         "cells": len(cells),

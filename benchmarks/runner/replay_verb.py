@@ -25,12 +25,11 @@ Item = TypeVar("Item")
 
 def one_cell(suite: Suite, store: Store, run: str, estimator: str, *, fault: str = CLEAN, seed: int = 0) -> Cell:
     """The cell of a suite by the ids of what it is made of; raises `SuiteError` that names the nearest."""
-    runs = _found("run", run, {one.id: one for one in suite.runs})
     contestants = _found("estimator", estimator, {one.id: one for one in suite.contestants})
     faults = _found("fault", fault, {one.id: one for one in suite.faults})
     if not 0 <= seed < suite.seeds:
         raise SuiteError(f"{suite.name}: there is no seed {seed}; its seeds are 0 to {suite.seeds - 1}")
-    return cells_of(replace(suite, runs=runs, contestants=contestants, faults=faults), store)[seed]
+    return cells_of(replace(suite, runs=(suite.run(run),), contestants=contestants, faults=faults), store)[seed]
 
 
 def _found(what: str, wanted: str, known: Mapping[str, Item]) -> tuple[Item]:

@@ -14,6 +14,7 @@ from benchmarks.runner.definition import Suite, load_suite
 from benchmarks.runner.execute import Done, execute
 from benchmarks.runner.plan import Cell, cells_of, missing, shard
 from benchmarks.runner.plan_verb import suite_options
+from benchmarks.runner.refusals import refuse_impossible
 from benchmarks.runner.results import ALIVE, Result, leaderboard, read_results
 from benchmarks.runner.store import Store
 from benchmarks.sheet import print_sheets
@@ -32,11 +33,14 @@ def run_suite(
     """Compute what is missing and answer the results of the whole suite that are there then.
 
     ``part``: number and count of a shard, from 1. ``dask``: the address of a scheduler that carries the cells out.
-    The same results whatever the workers, their order, or how often it was interrupted.
+    What can be refused is, before any work. The same results whatever the workers, their order, or how often it was
+    interrupted.
     """
     cells = cells_of(suite, store)
     wanted = cells if part is None else shard(cells, *part)
-    todo = [cell for kind in missing(wanted, store) for cell in kind]
+    open_cells = missing(wanted, store)
+    refuse_impossible(open_cells.estimates)
+    todo = [*open_cells.estimates, *open_cells.scores]
     for done, one in enumerate(_carried_out(todo, suite, store, workers, dask), start=1):
         if progress is not None:
             progress(done, len(todo), f"{one.cell.run.id} {one.cell.contestant.id}")

@@ -13,7 +13,7 @@ from benchmarks.runner.definition import RunSource
 from benchmarks.runner.store import Store, key_of, to_json
 from fusion import SuiteError, World
 from fusion.values import nanoseconds
-from logs.reader import read_run
+from logs.reader import read_run, read_world
 from logs.rosbag import read_bag
 from logs.run import Run, TruthTrack
 from sensors.simulation.scenario import load_scenario, scenario_text
@@ -31,9 +31,9 @@ class Content(NamedTuple):
 
 
 def place_of(source: RunSource, folder: Path) -> Path:
-    """The log of a run, from the folder of its suite; raises `SuiteError` when it is not there."""
+    """The log or bag of a run, from the folder of its suite; raises `SuiteError` when it is not there."""
     path = folder / str(source.mcap)
-    if not path.is_file():
+    if not (path.is_file() or (source.world is not None and path.is_dir())):
         brought = f"; `fusion import` brings it, see {source.catalogue} in the catalogue" if source.catalogue else ""
         raise SuiteError(f"run {source.id}: {path} is not there{brought or '; give the path from the suite file'}")
     return path
@@ -46,19 +46,37 @@ def open_run(source: RunSource, folder: Path) -> Run:
     path = place_of(source, folder)
     if source.world is not None:
         topics = tuple(sorted(source.topics.items()))
-        return _bag(path, path.stat().st_mtime_ns, folder / source.world, topics, source.truth_to_map)
-    return _read(path, path.stat().st_mtime_ns)
+        return _bag(path, state_of(path), folder / source.world, topics, source.truth_to_map)
+    return _read(path, state_of(path))
+
+
+State = tuple[tuple[str, int, int, int], ...]
+
+
+def state_of(path: Path) -> State:
+    """What tells that a log, or a file of a bag's folder, has changed: name, size, time [ns] and place on the disk."""
+    files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+    found = [(file.name, file.stat()) for file in files]
+    return tuple((name, status.st_size, status.st_mtime_ns, status.st_ino) for name, status in found)
+
+
+def open_world(source: RunSource, folder: Path) -> World:
+    """The world of the run, without the run where that can be; raises as `open_run`."""
+    if source.scenario is not None:
+        return load_scenario(scenario_of(source.scenario, folder)).world
+    path = place_of(source, folder)
+    return read_world(path) if source.world is None else World.load(folder / source.world)
 
 
 @lru_cache(maxsize=KEPT_RUNS)
-def _read(path: Path, _modified_ns: int) -> Run:
+def _read(path: Path, _state: State) -> Run:
     return read_run(path)
 
 
 @lru_cache(maxsize=KEPT_RUNS)
 def _bag(
     path: Path,
-    _modified_ns: int,
+    _state: State,
     world: Path,
     topics: tuple[tuple[str, str], ...],
     truth_to_map: tuple[float, float, float],
@@ -92,13 +110,10 @@ def content_of(source: RunSource, folder: Path, store: Store) -> Content:
     if source.scenario is not None:
         return _content_of_scenario(source, folder)
     path = place_of(source, folder)
-    status = path.stat()
     seen = key_of(
         {
             "path": str(path),
-            "size": status.st_size,
-            "modified_ns": status.st_mtime_ns,
-            "inode": status.st_ino,
+            "state": state_of(path),
             "read_as": [World.load(folder / source.world).table, dict(source.topics), source.truth_to_map]
             if source.world
             else None,

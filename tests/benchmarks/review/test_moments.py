@@ -154,13 +154,18 @@ def test_method_without_radio_says_so(tmp_path):
     ignored = Decision.UNUSABLE, Reason.KIND_NOT_CONSUMED
     moment = moment_of(tmp_path, lambda s: [(anchor, *ignored, None) for anchor in "abc"])
     assert moment.causes == ("uses no radio",)
+    late = Decision.LATE, Reason.TOO_LATE
+    moment = moment_of(tmp_path, lambda s: [("a", *(ignored if s else late), None), ("b", *ignored, None)])
+    assert moment.causes == ("uses no radio",)
 
 
 def test_command_can_be_pasted_and_names_parameters_and_a_seed_that_matters(tmp_path):
     run = tmp_path / "a run.mcap"
-    words = shlex.split(review_command(run, "ekf", 30.0))
+    words = shlex.split(review_command([str(run)], "ekf", 30.0))
     assert words == ["fusion", "review", str(run), "--estimators", "ekf", "--at", "30.00"]
-    words = shlex.split(review_command(run, "ekf", 30.0, params={"gate_probability": 0.9, "mode": "fast"}, seed=7))
+    words = shlex.split(
+        review_command([str(run)], "ekf", 30.0, params={"gate_probability": 0.9, "mode": "fast"}, seed=7)
+    )
     assert words[7:9] == ["--set", "ekf.gate_probability=0.9"]
     assert parse_settings(words[8:11:2]) == {"ekf": {"gate_probability": 0.9, "mode": "fast"}}
     assert words[-2:] == ["--seed", "7"]

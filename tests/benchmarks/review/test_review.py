@@ -2,6 +2,7 @@
 
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from benchmarks.review.review import review
 from fusion import ParameterError
 from fusion.cli import main
+from logs.reader import read_run
 from sensors.simulation.simulate import simulate
 
 
@@ -91,16 +93,9 @@ def test_numbers_that_mean_nothing_are_usage_errors(log, capsys, words):
     assert "give" in capsys.readouterr().err
 
 
-def test_worst_moments_need_truth(tmp_path, log, monkeypatch):
-    import dataclasses
-
-    from benchmarks.cell import cached_run
-    from benchmarks.review import review as module
-
-    blind = dataclasses.replace(cached_run(log), truth=None)
-    monkeypatch.setattr(module, "cached_run", lambda _: blind)
+def test_worst_moments_need_truth(log):
     with pytest.raises(ParameterError, match="no ground truth"):
-        review(log, estimators=["dead_reckoning"], worst=1)
+        review(replace(read_run(log), truth=None), estimators=["dead_reckoning"], worst=1)
 
 
 def test_made_up_run_of_the_cost_measurement_is_written(tmp_path):
