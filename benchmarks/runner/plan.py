@@ -14,6 +14,7 @@ import numpy as np
 import fusion
 from benchmarks.faults.fault_kind import Fault
 from benchmarks.faults.faults import read_fault
+from benchmarks.metrics.archive import ARCHIVE_VERSION
 from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.runner.definition import CLEAN, Contestant, Evaluation, FaultSet, RunSource, Suite
 from benchmarks.runner.source import Content, content_of, fingerprint
@@ -73,6 +74,7 @@ def contestant_spec(contestant: Contestant) -> dict[str, object]:
         "parameters": {**known, **contestant.params},
         "numpy": np.__version__,
         "python": platform.python_version(),
+        "archive": ARCHIVE_VERSION,
     }
 
 
