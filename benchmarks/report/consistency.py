@@ -6,14 +6,13 @@ Every mean has its own band, which counts how many independent samples it is of.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.metrics.innovations import NAMES
 from benchmarks.metrics.track import Floats
 from benchmarks.plotting import plain_colour
-from benchmarks.report.innovations import MeanNis, nis_of_cells
+from benchmarks.report.innovations import Banded, nis_of_cells
 from benchmarks.report.material import Material
 from benchmarks.report.panel import Panel, height_of
 from benchmarks.runner.results import Result, by_contestant
@@ -21,18 +20,8 @@ from benchmarks.runner.results import Result, by_contestant
 BAND = ("anees", "anees_band_low", "anees_band_high")
 
 
-class Banded(NamedTuple):
-    """A mean, ideal 1, and the band that holds an honest filter's with 95 %."""
-
-    result: Result
-    mean: float
-    low: float
-    high: float
-
-    @property
-    def is_inside(self) -> bool:
-        """Whether the filter may be honest."""
-        return self.low <= self.mean <= self.high
+Judged = tuple[Result, Banded]
+"""A cell, and the mean of what is judged of it."""
 
 
 def consistency(material: Material) -> Iterator[Panel]:
@@ -45,22 +34,21 @@ def consistency(material: Material) -> Iterator[Panel]:
         yield from _drawn(material, f"mean NIS of {sensor}", f"Readings of {sensor}: mean NIS", found)
 
 
-def _nees(result: Result) -> Banded:
-    mean, low, high = (result.metrics.get(key, np.nan) for key in BAND)
-    return Banded(result, mean, low, high)
+def _nees(result: Result) -> Judged:
+    return result, Banded(*(result.metrics.get(key, np.nan) for key in BAND))
 
 
 def _nis(
-    material: Material, found: Mapping[tuple[str, str], Mapping[str, MeanNis]], name: str, sensor: str
-) -> Iterator[Banded]:
+    material: Material, found: Mapping[tuple[str, str], Mapping[str, Banded]], name: str, sensor: str
+) -> Iterator[Judged]:
     for (run_id, own), told in found.items():
         if own == name and sensor in told:
-            yield Banded(material.series[run_id, own].result, *told[sensor])
+            yield material.series[run_id, own].result, told[sensor]
 
 
-def _drawn(material: Material, what: str, title: str, found: Mapping[str, Sequence[Banded]]) -> Iterator[Panel]:
+def _drawn(material: Material, what: str, title: str, found: Mapping[str, Sequence[Judged]]) -> Iterator[Panel]:
     """A row for each contestant that has any."""
-    known = {name: [one for one in own if np.isfinite(one.mean)] for name, own in found.items()}
+    known = {name: [one for one in own if np.isfinite(one[1].mean)] for name, own in found.items()}
     shown = {name: own for name, own in known.items() if own}
     if not shown:
         return
@@ -68,9 +56,10 @@ def _drawn(material: Material, what: str, title: str, found: Mapping[str, Sequen
     panel.axes.axvline(1.0, color="0.5", linewidth=1, zorder=1)
     for row, (name, own) in enumerate(shown.items()):
         places = row + np.linspace(-0.3, 0.3, len(own) + 2)[1:-1]
-        _draw(panel, plain_colour(material.use(name)), places, own)
-        for place, one in zip(places, own, strict=True):
-            panel.lead(one.mean, place, material.anchor(one.result), _said(name, what, one))
+        _draw(panel, plain_colour(material.use(name)), places, [one for _, one in own])
+        for place, (result, one) in zip(places, own, strict=True):
+            said = f"{name}, {result.cell.run.id}: {what} {one.mean:.2f} [{one.low:.2f}, {one.high:.2f}]"
+            panel.lead(one.mean, place, material.anchor(result), said)
     panel.rows(list(shown))
     panel.log("x")
     yield panel
@@ -78,12 +67,8 @@ def _drawn(material: Material, what: str, title: str, found: Mapping[str, Sequen
 
 def _draw(panel: Panel, colour: tuple[float, float, float], places: Floats, own: Sequence[Banded]) -> None:
     """Dots inside their bands, crosses outside: told apart without colour."""
-    mean, low, high = np.array([(one.mean, one.low, one.high) for one in own]).T
+    mean, low, high = np.array(own).T
     inside = np.array([one.is_inside for one in own])
     panel.axes.hlines(places, low, high, color="0.8", linewidth=3, zorder=1)
     panel.axes.scatter(mean[inside], places[inside], color=colour, s=24, zorder=2)
     panel.axes.scatter(mean[~inside], places[~inside], color=colour, s=32, marker="x", linewidth=2, zorder=2)
-
-
-def _said(name: str, what: str, one: Banded) -> str:
-    return f"{name}, {one.result.cell.run.id}: {what} {one.mean:.2f} [{one.low:.2f}, {one.high:.2f}]"

@@ -18,8 +18,8 @@ from benchmarks.runner.results import by_contestant, median_metrics
 from benchmarks.sheet import Sheet
 
 
-class MeanNis(NamedTuple):
-    """The mean NIS of one kind of sensor, ideal 1, and the band that holds an honest filter's with 95 %."""
+class Banded(NamedTuple):
+    """A mean, ideal 1, and the band that holds an honest filter's with 95 %."""
 
     mean: float
     low: float
@@ -31,7 +31,7 @@ class MeanNis(NamedTuple):
         return self.low <= self.mean <= self.high
 
 
-def mean_nis(fates: FateColumns) -> dict[str, MeanNis]:
+def mean_nis(fates: FateColumns) -> dict[str, Banded]:
     """Of every kind of sensor whose readings the estimator predicts; refused readings count, as in `nis95_wifi`.
 
     Every reading is a scalar, so chi-square of one degree. The band takes the effective number of readings, by the
@@ -44,11 +44,11 @@ def mean_nis(fates: FateColumns) -> dict[str, MeanNis]:
             own = own[np.argsort(fates.source[own], kind="stable")]
             nis = np.minimum(fates.nis[own], CEILING)
             (samples,) = effective_sizes(nis[None], fates.source[own].astype(np.int64)).tolist()
-            found[name] = MeanNis(mean(nis), *mean_chi_square_band(1.0, samples))
+            found[name] = Banded(mean(nis), *mean_chi_square_band(1.0, samples))
     return found
 
 
-def nis_of_cells(material: Material) -> dict[tuple[str, str], dict[str, MeanNis]]:
+def nis_of_cells(material: Material) -> dict[tuple[str, str], dict[str, Banded]]:
     """Of the cells that are shown, by run and contestant."""
     return {key: mean_nis(series.fates) for key, series in material.series.items()}
 
@@ -61,7 +61,7 @@ def innovations(material: Material) -> Sheet:
     return Sheet(title, head, tuple(_rows(material, found)))
 
 
-def _rows(material: Material, found: dict[tuple[str, str], dict[str, MeanNis]]) -> Iterator[tuple[str, ...]]:
+def _rows(material: Material, found: dict[tuple[str, str], dict[str, Banded]]) -> Iterator[tuple[str, ...]]:
     grouped = by_contestant(material.results)
     for name in material.contestants:
         medians = median_metrics(grouped[name])
@@ -73,7 +73,7 @@ def _rows(material: Material, found: dict[tuple[str, str], dict[str, MeanNis]]) 
                 yield (name, sensor, "–" if np.isnan(share) else f"{100.0 * share:.0f} %", *cells)
 
 
-def _cell(material: Material, run_id: str, name: str, told: MeanNis | None) -> str:
+def _cell(material: Material, run_id: str, name: str, told: Banded | None) -> str:
     if told is None:
         return "–"
     number = link(material, f"{told.mean:.2f}", material.series[run_id, name].result)
