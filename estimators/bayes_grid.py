@@ -14,7 +14,6 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from estimators.sampling import (
-    MOST_ALIKE,
     Array,
     carried,
     judged,
@@ -73,7 +72,8 @@ class BayesGrid:
         Share of readings expected to be outliers, in (0, 1).
     most_alike
         How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
-        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry.
+        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
+        20 where the world tells its `shadowing_length_m`, else 3.
     """
 
     summary: ClassVar[str] = "histogram Bayes filter over floor and heading; starts from anywhere"
@@ -86,7 +86,7 @@ class BayesGrid:
         cells: int = 1600,
         headings: int = 24,
         outlier_share: float = 0.05,
-        most_alike: float = MOST_ALIKE,
+        most_alike: float | None = None,
     ) -> None:
         if cells < 4 or headings < 4:
             raise ParameterError(f"bayes_grid: cells is {cells}, headings {headings}; give at least 4 of each")

@@ -16,7 +16,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.sampling import MOST_ALIKE, alike, require_most_alike
+from estimators.sampling import require_most_alike, sharing
 from fusion import (
     Covariance,
     Decision,
@@ -67,14 +67,16 @@ class Ekf:
         Whether distance scale, turn scale and turn-rate bias are states.
     estimate_range_bias, estimate_rssi_bias
         Whether each anchor's common error is a state. Off, its variance is added to that of every reading. A range
-        offset belongs to the radio and is well worth a state. Shadowing belongs to the place, and while the heading
-        is poor such states explain away the readings that would correct it, so for RSSI they are off.
+        offset belongs to the radio and is well worth a state. Shadowing belongs to the place, and where it is only
+        guessed over what path, such states explain away the readings that would correct the heading. None: where the
+        world tells its `shadowing_length_m`.
     rssi_bias_length_m, range_bias_length_m
-        Path after which an anchor's common error is forgotten by 1/e [m]: shadowing belongs to the place, a range
-        offset to the radio.
+        Path after which an anchor's common error is forgotten by 1/e [m], where the world does not tell: shadowing
+        belongs to the place, a range offset to the radio.
     most_alike
         How many neighbouring readings of an anchor at most are taken to share one error, where that is not a state. 1
-        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry.
+        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
+        20 where the world tells its `shadowing_length_m`, else 3.
     """
 
     summary: ClassVar[str] = "extended Kalman filter with odometry calibration and anchor biases as states"
@@ -87,10 +89,10 @@ class Ekf:
         gate_probability: float = 0.999,
         estimate_odometry: bool = True,
         estimate_range_bias: bool = True,
-        estimate_rssi_bias: bool = False,
+        estimate_rssi_bias: bool | None = None,
         rssi_bias_length_m: float = 2.0,
         range_bias_length_m: float = 100.0,
-        most_alike: float = MOST_ALIKE,
+        most_alike: float | None = None,
     ) -> None:
         if not 0.0 < gate_probability <= 1.0:
             raise ParameterError(f"ekf: gate_probability is {gate_probability}; give a probability in (0, 1]")
@@ -116,10 +118,11 @@ class Ekf:
         kept_m = []
         wanted = {PathLoss: estimate_rssi_bias, Ranging: estimate_range_bias}
         for anchor_id, model in models:
-            if wanted[type(model)] and model.bias_std > 0.0:
+            told, asked = model.bias_length_m, wanted[type(model)]
+            if model.bias_std > 0.0 and (told is not None if asked is None else asked):
                 self._bias_index[anchor_id, type(model)] = 3 + len(stds)
                 stds.append(model.bias_std)
-                kept_m.append(self._lengths_m[type(model)])
+                kept_m.append(told or self._lengths_m[type(model)])
         self._extra_variance = np.square(np.array(stds))
         self._bias_length_m = np.array(kept_m)
 
@@ -228,8 +231,8 @@ class Ekf:
             row[gain] = expected.by_gain
             innovation -= expected.by_gain * float(mean[gain])
         if (bias := self._bias_index.get((sighting.anchor.id, kind))) is None:
-            sharing = alike(path_m, self._lengths_m[kind], self._most_alike)
-            return innovation, row, variance + sharing * sighting.model.bias_std**2
+            times = sharing(sighting.model, path_m, self._most_alike, self._lengths_m[kind])
+            return innovation, row, variance + times * sighting.model.bias_std**2
         row[bias] = 1.0
         return innovation - float(mean[bias]), row, variance
 

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from estimators.ekf import chi_square_gate
-from estimators.sampling import MOST_ALIKE, Array, repeated_variance, require_most_alike, total_variance
+from estimators.sampling import Array, repeated_variance, require_most_alike, total_variance
 from fusion import (
     Covariance,
     Decision,
@@ -58,7 +58,7 @@ class FilterpyFilter(ABC):
 
     tags: ClassVar[frozenset[Tag]] = frozenset({Tag.HEADING_START})
 
-    def __init__(self, world: World, *, gate_probability: float = 0.999, most_alike: float = MOST_ALIKE) -> None:
+    def __init__(self, world: World, *, gate_probability: float = 0.999, most_alike: float | None = None) -> None:
         if not 0.0 < gate_probability <= 1.0:
             raise ParameterError(f"filterpy: gate_probability is {gate_probability}; give a probability in (0, 1]")
         filterpy_kalman()
@@ -128,7 +128,8 @@ class FilterpyEkf(FilterpyFilter):
         degree of freedom. 1.0 takes every reading.
     most_alike
         How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
-        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry.
+        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
+        20 where the world tells its `shadowing_length_m`, else 3.
     """
 
     summary: ClassVar[str] = "extended Kalman filter of filterpy"

@@ -26,7 +26,8 @@ class FilterpyUkf(FilterpyFilter):
         degree of freedom. 1.0 takes every reading.
     most_alike
         How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
-        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry.
+        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
+        20 where the world tells its `shadowing_length_m`, else 3.
     """
 
     summary: ClassVar[str] = "unscented Kalman filter of filterpy"

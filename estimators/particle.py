@@ -15,7 +15,6 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from estimators.sampling import (
-    MOST_ALIKE,
     Array,
     carried,
     judged,
@@ -81,14 +80,15 @@ class Particle:
         Share of readings expected to be outliers, in (0, 1).
     most_alike
         How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
-        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry.
+        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
+        20 where the world tells its `shadowing_length_m`, else 3.
     """
 
     summary: ClassVar[str] = "particle filter with an outlier mixture; starts from anywhere"
     tags: ClassVar[frozenset[Tag]] = frozenset({Tag.STOCHASTIC, Tag.GLOBAL_START, Tag.HEADING_START})
 
     def __init__(
-        self, world: World, *, particles: int = 1000, outlier_share: float = 0.05, most_alike: float = MOST_ALIKE
+        self, world: World, *, particles: int = 1000, outlier_share: float = 0.05, most_alike: float | None = None
     ) -> None:
         if particles < 1:
             raise ParameterError(f"particle: particles is {particles}; give at least 1")

@@ -25,16 +25,18 @@ from fusion import (
     WifiScan,
     wrap_angle,
 )
-from fusion.radio import PathLoss
+from fusion.radio import DistanceModel, PathLoss
 
 Array = NDArray[np.float64]
 
 OUTLIER_WIDTH = 20.0
 """Width of the uniform part of the mixture, in standard deviations of the reading."""
 SHADOWING_LENGTH_M = 2.0
-"""Path over which an anchor's shadowing stays alike [m], where a filter has no parameter for it."""
-MOST_ALIKE = 3.0
-"""How many neighbouring readings at most are taken to share one error, unless a parameter says otherwise."""
+"""Path over which an anchor's shadowing stays alike [m], where the world does not tell."""
+MOST_ALIKE, MOST_ALIKE_TOLD = 3.0, 20.0
+"""How many neighbouring readings at most are taken to share one error, unless a parameter says otherwise: where the
+path over which they do is a guess, and where the world tells it.
+"""
 DOUBTED_BELOW = 0.5
 """A reading counts as down-weighted when it is more likely an outlier than not."""
 
@@ -74,17 +76,27 @@ def alike(path_m: float, length_m: float, most_alike: float) -> float:
     return min(max(length_m / max(path_m, 1e-9), 1.0), most_alike)
 
 
-def repeated_variance(sighting: Sighting, path_m: float, most_alike: float) -> float:
+def sharing(model: DistanceModel, path_m: float, most_alike: float | None, length_m: float) -> float:
+    """`alike` for the common error of an anchor's ``model``; ``length_m`` where the world does not tell its own,
+    ``most_alike`` None: as much as is known of it.
+    """
+    told = model.bias_length_m
+    bound = most_alike or (MOST_ALIKE if told is None else MOST_ALIKE_TOLD)
+    return alike(path_m, told or length_m, bound)
+
+
+def repeated_variance(sighting: Sighting, path_m: float, most_alike: float | None) -> float:
     """`total_variance` for an update by one of many readings, ``path_m`` after the one before. Shadowing belongs to the
     place (Gudmundson 1991), so what neighbouring signal strengths share is taken as many times as they are `alike`.
     """
-    common = sighting.model.bias_std**2 if isinstance(sighting.model, PathLoss) else 0.0
-    return total_variance(sighting) + (alike(path_m, SHADOWING_LENGTH_M, most_alike) - 1.0) * common
+    model = sighting.model
+    times = sharing(model, path_m, most_alike, SHADOWING_LENGTH_M) if isinstance(model, PathLoss) else 1.0
+    return total_variance(sighting) + (times - 1.0) * model.bias_std**2
 
 
-def require_most_alike(name: str, most_alike: float) -> float:
-    """``most_alike``; raises `ParameterError` where it is not a finite number of at least one."""
-    if not 1.0 <= most_alike < math.inf:
+def require_most_alike(name: str, most_alike: float | None) -> float | None:
+    """``most_alike``; raises `ParameterError` where it is neither None nor a finite number of at least one."""
+    if most_alike is not None and not 1.0 <= most_alike < math.inf:
         raise ParameterError(
             f"{name}: most_alike is {most_alike}; give a number from 1, which takes all as independent"
         )

@@ -52,6 +52,10 @@ class DistanceModel(Protocol):
         """The distance [m] at which ``reading`` is expected."""
 
     @property
+    def bias_length_m(self) -> float | None:
+        """Path after which that common error is forgotten by 1/e [m]; None: not known."""
+
+    @property
     def gain_std(self) -> float:
         """How far the dependence on distance may be off for all anchors together, one standard deviation."""
 
@@ -74,6 +78,8 @@ class PathLoss:
     reference_rssi_dbm: float | None = None
     shadowing_std_db: float = 4.0
     bias_std_db: float = 4.0
+    shadowing_length_m: float | None = None
+    """Over this path shadowing stays alike, down to 1/e (Gudmundson 1991) [m]; None: not known."""
     exponent_std: float = 0.0
 
     @property
@@ -93,6 +99,11 @@ class PathLoss:
     def bias_std(self) -> float:
         """Common error of all readings of the anchor [dB]."""
         return self.bias_std_db
+
+    @property
+    def bias_length_m(self) -> float | None:
+        """It belongs to the place as far as it is shadowing."""
+        return self.shadowing_length_m
 
     def expected(self, distance_m: ArrayLike) -> Array:
         """RSSI [dBm] expected at ``distance_m``; constant below the reference distance."""
@@ -152,6 +163,11 @@ class Ranging:
     def distance(self, reading: ArrayLike) -> Array:
         """Distance [m] behind a measured range; never less than zero."""
         return np.asarray(np.maximum((np.asarray(reading) - self.offset_m) / self.scale, 0.0))
+
+    @property
+    def bias_length_m(self) -> None:
+        """Never told: an offset belongs to the radio."""
+        return None
 
     @property
     def gain_std(self) -> float:

@@ -93,6 +93,15 @@ class Robot:
         return 2.0 / (1.0 + self.diameter_ratio), 2.0 * self.diameter_ratio / (1.0 + self.diameter_ratio)
 
 
+POSITIVE_RADIO = (
+    "frequency_hz",
+    "path_loss_exponent",
+    "reference_distance_m",
+    "shadowing_std_db",
+    "shadowing_length_m",
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Calibration:
     """Where calibrated numbers of a world come from, for people and reports; no estimator reads it.
@@ -226,7 +235,7 @@ def _read_anchor(row: Any, world: Mapping[str, Any], antenna_height_m: float, wh
         ranging=read_record(Ranging, {**world.get("ranging", {}), **_own(row, "ranging", where)}, f"{where}.ranging"),
     )
     for name, model, keys in (
-        ("radio", anchor.radio, ("frequency_hz", "path_loss_exponent", "reference_distance_m", "shadowing_std_db")),
+        ("radio", anchor.radio, POSITIVE_RADIO),
         ("ranging", anchor.ranging, ("scale", "std_m")),
     ):
         _require_positive(model, keys, f"{where}.{name}")
@@ -243,8 +252,9 @@ def _own(row: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
 
 def _require_positive(record: object, keys: tuple[str, ...], where: str) -> None:
     for key in keys:
-        if getattr(record, key) <= 0:
-            raise WorldError(f"{where}.{key}: {getattr(record, key)} must be greater than zero")
+        value = getattr(record, key)
+        if value is not None and value <= 0:
+            raise WorldError(f"{where}.{key}: {value} must be greater than zero")
 
 
 def _check_anchors(anchors: tuple[Anchor, ...]) -> None:

@@ -168,7 +168,7 @@ def changes(world: World, found: RadioCalibration) -> tuple[dict[str, object], d
     )
     if found.kind == "rssi":
         section, level, names = "radio", "reference_rssi_dbm", ("path_loss_exponent", "exponent_std")
-        stds = {"shadowing_std_db": std, "bias_std_db": bias}
+        stds = {"shadowing_std_db": std, "bias_std_db": bias, "shadowing_length_m": line.length_m}
     else:
         section, level, names = "ranging", "offset_m", ("scale", "scale_std")
         stds = {"std_m": std, "bias_std_m": bias}

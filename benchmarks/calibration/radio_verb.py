@@ -86,6 +86,7 @@ def _sheets(world: World, found: RadioCalibration) -> list[Sheet]:
         (f"σ of one reading, {unit}", f"{found.std:.2f}"),
         (f"  of it within a place, {unit}", f"{found.spots.scatter:.2f}"),
         (f"  of it between places, {unit}", f"{line.place_std:.2f}"),
+        ("  which stays alike over, m", f"{line.length_m:.2f}"),
         (f"spots of one anchor and place: {line.spots}, worth", f"{line.effective:.0f}"),
     ]
     head = "anchor", "places", GAINS[found.kind], LEVELS[found.kind], f"σ places, {unit}", "heard %"

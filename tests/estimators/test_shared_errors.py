@@ -1,10 +1,15 @@
 """Readings from neighbouring places share the shadowing of the place, and must not count as independent."""
 
+import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from benchmarks.lane import run_lane
+from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.score import errors, metrics
 from estimators.sampling import repeated_variance, total_variance
 from fusion import (
     Covariance,
@@ -17,11 +22,14 @@ from fusion import (
     RssiReading,
     WifiScan,
     World,
+    WorldError,
     build,
     sightings,
     track,
 )
 from fusion.values import NANOSECONDS as SECOND
+from sensors.simulation.scenario import load_scenario
+from sensors.simulation.simulate import simulated_run
 
 PLACES = {"a": (-20.0, 3.0), "b": (25.0, -15.0), "c": (3.0, 28.0)}
 RADIO = {"shadowing_std_db": 2.0, "bias_std_db": 3.0, "path_loss_exponent": 2.5}
@@ -30,9 +38,9 @@ START = Prior(0, Pose(0.0, 0.0, 0.0), Covariance.from_std(3.0, 3.0, 0.01))
 FILTERS = pytest.mark.parametrize("name", ["ekf", "filterpy_ekf", "filterpy_ukf", "particle", "bayes_grid"])
 
 
-def world():
+def world(**radio):
     anchors = [{"id": name, "position_m": list(place)} for name, place in PLACES.items()]
-    return World.from_table({"anchors": anchors, "radio": RADIO, "robot": {"noise": QUIET}})
+    return World.from_table({"anchors": anchors, "radio": {**RADIO, **radio}, "robot": {"noise": QUIET}})
 
 
 def scan(time_ns, seq):
@@ -42,12 +50,12 @@ def scan(time_ns, seq):
     return WifiScan(time_ns, "wifi", seq, tuple(heard))
 
 
-def spread(name, step_m, scans=40, **options):
+def spread(name, step_m, scans=40, radio=None, **options):
     """Trace of the position's covariance after ``scans``, the robot rocking to and fro by ``step_m`` in between."""
     told = []
     for k in range(1, scans + 1):
         told += [Odometry(k * SECOND, "w", k, (k - 1) * SECOND, step_m * (-1) ** k, 0.0), scan(k * SECOND, k)]
-    place = world()
+    place = world(**(radio or {}))
     covariance = list(track(build(name, place, options), place, told, START, seed=5))[-1].estimate.covariance
     return covariance.xx + covariance.yy
 
@@ -107,3 +115,59 @@ def test_innovation_keeps_the_variance_of_one_reading(name):
 def test_impossible_sharing_is_refused(name, most_alike):
     with pytest.raises(ParameterError, match="most_alike is"):
         build(name, world(), {"most_alike": most_alike})
+
+
+TOLD = {"shadowing_length_m": 5.0}
+
+
+@pytest.mark.parametrize(
+    ("path_m", "most_alike", "times"), [(0.0, None, 20.0), (0.5, None, 10.0), (9.0, None, 1.0), (0.5, 4.0, 4.0)]
+)
+def test_common_error_counts_as_often_as_the_world_tells_that_it_is_shared(path_m, most_alike, times):
+    sighting = sightings(world(**TOLD), scan(0, 0))[0]
+    assert repeated_variance(sighting, path_m, most_alike) == pytest.approx(2.0**2 + times * 3.0**2)
+
+
+def test_common_error_counts_up_to_three_times_where_the_world_does_not_tell():
+    sighting = sightings(world(), scan(0, 0))[0]
+    assert repeated_variance(sighting, 0.0, None) == repeated_variance(sighting, 0.0, 3.0)
+
+
+@FILTERS
+def test_filter_that_is_told_how_long_shadowing_lasts_is_not_made_sure_by_its_repetition(name):
+    assert spread(name, 0.5, radio=TOLD) > 1.5 * spread(name, 0.5)
+
+
+def test_error_of_an_anchor_is_a_state_where_the_world_tells_its_length_or_a_parameter_asks():
+    def states(place, **options):
+        estimator = build("ekf", place, options)
+        return len(estimator.start(START, seed=0).mean)
+
+    assert states(world()) == states(world(**TOLD), estimate_rssi_bias=False) < states(world(**TOLD))
+    assert states(world(), estimate_rssi_bias=True) == states(world(**TOLD))
+
+
+@pytest.mark.parametrize("length_m", [0.0, -2.0])
+def test_length_that_cannot_be_is_refused(length_m):
+    with pytest.raises(WorldError, match=r"shadowing_length_m: .* must be greater than zero"):
+        world(shadowing_length_m=length_m)
+
+
+@pytest.mark.parametrize("name", ["ekf", "particle"])
+def test_filter_that_is_told_is_more_honest_and_better_in_a_simulated_office(name):
+    """The simulated field is Gaussian with a squared-exponential correlation: alike, not equal, to what is assumed."""
+    found = {}
+    for told in (True, False):
+        scores = []
+        for seed in (10, 11):
+            run = simulated_run(load_scenario("office"), seed)
+            table = json.loads(run.world.table)
+            if not told:
+                del table["radio"]["shadowing_length_m"]
+            lane = run_lane(replace(run, world=World.from_table(table)), name, seed=0)
+            instants = evaluation_instants(run.truth)
+            scores.append(metrics(errors(instants, match(instants, lane.track))))
+        found[told] = [float(np.mean([score[key] for score in scores])) for key in ("pos_rmse", "anees")]
+    assert found[True][0] < found[False][0]
+    assert found[True][1] < 2.0
+    assert found[False][1] > 3.0

@@ -48,6 +48,17 @@ def test_intervals_hold_the_truth_as_often_as_they_say(rssi_run, length):
     assert line.gain_interval().reach < 1.5
 
 
+@pytest.mark.parametrize("length", [1.0, 2.0])
+def test_world_is_told_over_what_path_shadowing_stays_alike(rssi_run, length):
+    told = []
+    for seed in range(15):
+        points = floor(seed, 100)
+        values = expected(points) + shadowed(points, seed, 4.0, length)
+        radio = findings([rssi_run(points, values, each=1)]).changes["radio"]
+        told.append(radio["shadowing_length_m"])
+    assert 0.5 * length < np.median(told) < 2.0 * length
+
+
 def calibrate_line(run):
     return calibrate_radio([run], "rssi").line
 
@@ -161,6 +172,7 @@ def test_ranges_have_scale_and_offset(rssi_run):
     assert found.line.level_interval().holds(0.3)
     assert found.line.level_interval().reach < 0.1
     assert findings([ranged]).changes["ranging"]["scale"] == pytest.approx(1.05, abs=0.01)
+    assert "shadowing_length_m" not in findings([ranged]).changes["ranging"]
 
 
 def test_surveyed_points_do_without_truth(rssi_run, tmp_path):
