@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,8 @@ from benchmarks.metrics.peaks import peaks
 from benchmarks.metrics.track import Flags
 from benchmarks.review.drawing import Drawing
 from benchmarks.review.events import OWN_REFUSALS
-from fusion import Decision, Odometry, Reason, WheelTicks
+from benchmarks.review.pulls import Growth, growth, misreadings
+from fusion import Decision, Odometry, Reason, Update, WheelTicks, World
 from fusion.values import nanoseconds, seconds
 from logs.run import Run
 
@@ -30,37 +32,59 @@ TOGETHER_S = 1.0
 SURPRISING_NIS = 9.0
 """Three standard deviations: a reading so far off that was believed all the same."""
 
+MISLEADING = 1.0
+"""Standard deviations by which an anchor's readings are off, on average, before they are said to have misled."""
+
 
 class Moment(NamedTuple):
     """A local maximum of the position error [m], infinite where there was no valid answer, ``at_s`` after the run's
-    start, with what was unusual just before.
+    start, with what was unusual just before, how the error grew in that time (None: not known), and what the error
+    would have been at that moment [m] by what was done otherwise.
     """
 
     estimator: str
     at_s: float
     error_m: float
     causes: tuple[str, ...]
+    growth: Growth | None = None
+    otherwise: Mapping[str, float] = MappingProxyType({})
 
 
-def worst_moments(run: Run, drawing: Drawing, start_ns: int, count: int) -> list[Moment]:
-    """The ``count`` worst moments of a lane, the worst first; none where nothing is judged."""
+def worst_moments(
+    run: Run, drawing: Drawing, start_ns: int, count: int, ghosts: Sequence[Drawing] = ()
+) -> list[Moment]:
+    """The ``count`` worst moments of a lane, the worst first; none where nothing is judged. ``ghosts``: what it would
+    have been, whose errors at those moments are told by the ghosts' names.
+    """
     if drawing.instants is None or drawing.score.errors is None:
         return []
     time_ns, errors_m = drawing.instants.time_ns, drawing.score.errors.position
     moments = []
     for place in peaks(time_ns, errors_m, count):
         at_ns = int(time_ns[place])
-        causes = tuple(_causes(run, drawing, at_ns)) or ("nothing unusual in the readings",)
-        moments.append(Moment(drawing.name, seconds(at_ns - start_ns), float(errors_m[place]), causes))
+        recent = _updates_before(drawing, at_ns)
+        causes = tuple(_causes(run, drawing, recent, at_ns)) or ("nothing unusual in the readings",)
+        # Ghosts are judged by the same truth, so that their instants are the same.
+        otherwise = {g.name: float(g.score.errors.position[place]) for g in ghosts if g.score.errors is not None}
+        what = (drawing.name, seconds(at_ns - start_ns), float(errors_m[place]), causes)
+        moments.append(Moment(*what, growth(recent, drawing.instants), otherwise))
     return moments
 
 
-def _causes(run: Run, drawing: Drawing, at_ns: int) -> Iterator[str]:
+def _updates_before(drawing: Drawing, at_ns: int) -> Sequence[Update]:
+    """Those just before ``at_ns``."""
+    span_ns = (at_ns - nanoseconds(JUST_BEFORE_S), at_ns)
+    first, end = np.searchsorted(drawing.estimates.time_ns, span_ns, side="right").tolist()
+    return drawing.lane.final[first:end]
+
+
+def _causes(run: Run, drawing: Drawing, recent: Sequence[Update], at_ns: int) -> Iterator[str]:
     """What was unusual just before ``at_ns``, in words."""
     yield from _of_estimates(drawing, at_ns)
     if drawing.gates:
         yield from _of_reception(drawing.fates, at_ns)
         yield from _of_judgement(drawing.fates, at_ns)
+        yield from _of_truth(run.world, drawing, recent)
     else:
         yield "uses no radio"
     yield from _of_motion(run, at_ns)
@@ -126,6 +150,21 @@ def _of_judgement(fates: FateColumns, at_ns: int) -> Iterator[str]:
     if len(taken):
         worst = taken[np.argmax(fates.nis[taken])]
         yield f"{fates.names[fates.source[worst]]} taken with NIS {fates.nis[worst]:.1f}"
+
+
+def _of_truth(world: World, drawing: Drawing, recent: Sequence[Update]) -> Iterator[str]:
+    """The anchor that misled most, and those that were right and not believed."""
+    if drawing.instants is None:
+        return
+    found = list(misreadings(world, recent, FateColumns.of(recent), drawing.instants))
+    misled = [one for one in found if one.taken > 0.0 and one.sigmas >= MISLEADING]
+    if misled:
+        worst = max(misled, key=lambda one: one.sigmas)
+        side = "farther" if worst.farther_m > 0.0 else "nearer"
+        yield f"believed {worst.anchor}, {abs(worst.farther_m):.2f} m {side} than it was ({worst.sigmas:.1f}σ)"
+    right = [one.anchor for one in found if one.taken == 0.0 and one.sigmas < MISLEADING]
+    if right:
+        yield f"did not believe {', '.join(right)}, though right"
 
 
 def _reasons(fates: FateColumns, chosen: Flags) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -21,7 +20,7 @@ from benchmarks.output import require_place
 from benchmarks.review.counterfactual import Counterfactual, counterfactuals, ghost_lane, require_within
 from benchmarks.review.drawing import drawings
 from benchmarks.review.frame import Frame
-from benchmarks.review.invocation import review_command
+from benchmarks.review.listing import told
 from benchmarks.review.moments import Moment, worst_moments
 from benchmarks.review.picture import render
 from benchmarks.review.scene import SUFFIX, write_scene
@@ -118,10 +117,13 @@ def _watched_lane(run: Run, name: str, params: Mapping[str, object], seed: int) 
 
 
 def _worst(run: Run, lanes: Sequence[Lane], scores: Sequence[Score], count: int) -> list[Moment]:
-    """Of every estimator, the best first; ghosts are looked at, not searched."""
-    start_ns, drawn = Frame.around(run).start_ns, drawings(run, lanes, scores)
-    found = [worst_moments(run, drawing, start_ns, count) for drawing in drawn if not drawing.ghost]
-    return [moment for moments in found for moment in moments]
+    """Of every estimator, the best first; ghosts are compared, not searched."""
+    start_ns, drawn, found = Frame.around(run).start_ns, drawings(run, lanes, scores), []
+    for drawing in drawn:
+        if not drawing.ghost:
+            ghosts = [other for other in drawn if other.lane.ghost_of == drawing.name]
+            found += worst_moments(run, drawing, start_ns, count, ghosts)
+    return found
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -181,17 +183,6 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.web:
             _serve(made.files, arguments.at)
     return 0
-
-
-def told(moments: Sequence[Moment], run: Sequence[str], settings: Settings, seed: int) -> list[str]:
-    """The worst moments as lines: what, why, and how to look at it; ``run``: the words that name it."""
-    lines = []
-    for moment in moments:
-        error = f"{moment.error_m:.2f} m" if math.isfinite(moment.error_m) else "no answer"
-        lines.append(f"{moment.estimator} at {moment.at_s:.2f} s: {error}; {', '.join(moment.causes)}\n")
-        params = settings.get(moment.estimator)
-        lines.append(f"    {review_command(run, moment.estimator, moment.at_s, params=params, seed=seed)}\n")
-    return lines
 
 
 def _serve(files: Sequence[Path], at_s: float | None) -> None:

@@ -16,6 +16,7 @@ from benchmarks.metrics.peaks import SPACING_S, peaks
 from benchmarks.review.drawing import drawings
 from benchmarks.review.invocation import review_command
 from benchmarks.review.moments import Moment, worst_moments
+from benchmarks.review.pulls import Growth
 from fusion import Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, Truth, Update
 from logs.run import Run, TruthTrack
 
@@ -23,6 +24,8 @@ SECOND_NS = 1_000_000_000
 WORLD = fusion.World.from_table(
     {"name": "w", "anchors": [{"id": n, "position_m": [i, i * i]} for i, n in enumerate("abc")]}
 )
+RANGE_M = {anchor.id: float(np.hypot(anchor.x, anchor.y)) for anchor in WORLD.anchors}
+"""What is measured at the origin, where the truth is."""
 TAKEN, GATED = (Decision.USED, Reason.OK), (Decision.REJECTED, Reason.GATE)
 LENGTH_S = 40
 
@@ -61,9 +64,9 @@ def test_peaks_hold_the_maximum_and_keep_their_distance(values, count):
     assert all(abs(a - b) >= SPACING_S for i, a in enumerate(found) for b in found[:i])
 
 
-def moment_of(tmp_path, judge, *, odometry=lambda _: True, **claims):
+def moment_of(tmp_path, judge, *, odometry=lambda _: True, off_m=lambda *_: 0.0, **claims):
     """The worst moment of a lane whose error peaks at 30 s; ``judge`` gives (anchor, decision, reason, NIS) rows for
-    each second, empty for no scan.
+    each second, empty for no scan; ``off_m``: how wrong a reading is, by second and anchor.
     """
     truth = [Truth(s * SECOND_NS, 0.0, 0.0, 0.0) for s in range(LENGTH_S)]
     updates = []
@@ -73,7 +76,7 @@ def moment_of(tmp_path, judge, *, odometry=lambda _: True, **claims):
         if odometry(s):
             updates.append(Update(Odometry(stamp, "wheels", s, stamp - SECOND_NS, 0.0, 0.0), estimate, ()))
         if judged := judge(s):
-            ranges = Ranges(stamp, "uwb", s, tuple(RangeReading(anchor, 1.0) for anchor, *_ in judged))
+            ranges = Ranges(stamp, "uwb", s, tuple(RangeReading(a, RANGE_M[a] + off_m(s, a)) for a, *_ in judged))
             fates = (Fate(stamp, "uwb", s, a, decision, reason, 1.0, nis=nis) for a, decision, reason, nis in judged)
             updates.append(Update(ranges, estimate, tuple(fates)))
     measurements = tuple(update.measurement for update in updates)
@@ -92,12 +95,12 @@ def all_taken(second, nis=1.0):
 
 def test_quiet_moment_has_time_error_and_no_cause(tmp_path):
     moment = moment_of(tmp_path, all_taken)
-    assert moment == Moment("toy", 30.0, 6.0, ("nothing unusual in the readings",))
+    assert moment == Moment("toy", 30.0, 6.0, ("nothing unusual in the readings",), Growth(1.0, 0.0, 5.0))
 
 
 def test_rejected_readings_are_counted_over_the_seconds_before(tmp_path):
     moment = moment_of(tmp_path, lambda s: [(a, *GATED, 20.0) for a in "abc"] if s > 27 else all_taken(s))
-    assert moment.causes == ("9 of 15 readings rejected (gate)",)
+    assert moment.causes[0] == "9 of 15 readings rejected (gate)"
 
 
 def test_single_rejected_reading_is_no_cause(tmp_path):
@@ -120,7 +123,7 @@ def test_anchors_heard_one_after_the_other_within_a_second_count_together(tmp_pa
 def one_anchor_at_a_time(tmp_path, truth):
     updates = []
     for k, pose in enumerate(truth):
-        ranges = Ranges(pose.time_ns, "uwb", k, (RangeReading("abc"[k % 3], 1.0),))
+        ranges = Ranges(pose.time_ns, "uwb", k, (RangeReading("abc"[k % 3], RANGE_M["abc"[k % 3]]),))
         fate = Fate(pose.time_ns, "uwb", k, "abc"[k % 3], *TAKEN, 1.0)
         updates.append(Update(ranges, Estimate(pose.time_ns, Pose(k % 100 / 10, 0.0, 0.0), None), (fate,)))
     run = Run(
@@ -185,3 +188,25 @@ def test_late_readings_are_counted(tmp_path, late):
     judged = [("a", Decision.LATE, Reason.TOO_LATE, None)] * late
     moment = moment_of(tmp_path, lambda s: judged + all_taken(s))
     assert any("late (too late)" in cause for cause in moment.causes) == bool(late)
+
+
+def test_anchor_that_misled_most_is_named_by_what_it_said_of_the_true_place(tmp_path):
+    moment = moment_of(tmp_path, all_taken, off_m=lambda _, anchor: {"a": -0.3, "c": 3.0}.get(anchor, 0.0))
+    std = np.hypot(np.hypot(0.15, 0.15), 0.05 * RANGE_M["c"])
+    assert moment.causes == (f"believed c, 3.00 m farther than it was ({3.0 / std:.1f}σ)",)
+
+
+def test_wrong_readings_that_were_refused_did_not_mislead_and_right_ones_were_refused_in_vain(tmp_path):
+    def judge(second):
+        return [("a", *TAKEN, 1.0), ("b", *TAKEN, 1.0), ("c", *GATED, 20.0)]
+
+    moment = moment_of(tmp_path, judge, off_m=lambda _, anchor: 9.0 * (anchor == "c"))
+    assert moment.causes == ("nothing unusual in the readings",)
+    assert moment_of(tmp_path, judge).causes == ("did not believe c, though right",)
+
+
+def test_growth_of_the_error_is_shared_out_among_scans_and_the_time_between_them(tmp_path):
+    alone = moment_of(tmp_path, all_taken, odometry=lambda s: s != 30)
+    assert alone.growth == Growth(1.0, 5.0, 0.0)
+    silent = moment_of(tmp_path, lambda s: all_taken(s) if s < 30 else [])
+    assert silent.growth == Growth(1.0, 0.0, 5.0)

@@ -50,6 +50,13 @@ def test_parameters_are_given_reach_the_estimator_and_stand_in_the_command(log, 
     assert out.endswith(f" --set {word}\n")
 
 
+def test_ghosts_tell_what_the_error_of_a_worst_moment_would_have_been(log, capsys):
+    _, out, _ = told(capsys, log, "--estimators", "ekf", "--worst", "1", "--without", "ap1")
+    (moment,) = review(log, estimators=["ekf"], worst=1, without=["ap1"]).moments
+    assert moment.otherwise["ekf without ap1"] != moment.error_m
+    assert out.splitlines()[0].endswith(f"; ekf without ap1: {moment.otherwise['ekf without ap1']:.2f} m")
+
+
 @pytest.mark.parametrize(
     ("word", "told_of"),
     [("ekf.gate=1", "gate_probability"), ("efk.gate_probability=0.9", "did you mean 'ekf'"), ("gate=1", "expected")],

@@ -1,0 +1,34 @@
+"""The worst moments as lines of text, each with the command that shows it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from benchmarks.bench import Settings
+from benchmarks.review.invocation import review_command
+from benchmarks.review.moments import JUST_BEFORE_S, Moment
+from benchmarks.review.pulls import Growth
+
+
+def told(moments: Sequence[Moment], run: Sequence[str], settings: Settings, seed: int) -> list[str]:
+    """The worst moments as lines: what, why, and how to look at it; ``run``: the words that name it."""
+    lines = []
+    for moment in moments:
+        grown = "" if moment.growth is None or not math.isfinite(moment.error_m) else f" ({_grown(moment.growth)})"
+        facts = [*moment.causes, *(f"{name}: {_length(error_m)}" for name, error_m in moment.otherwise.items())]
+        lines.append(
+            f"{moment.estimator} at {moment.at_s:.2f} s: {_length(moment.error_m)}{grown}; {'; '.join(facts)}\n"
+        )
+        params = settings.get(moment.estimator)
+        lines.append(f"    {review_command(run, moment.estimator, moment.at_s, params=params, seed=seed)}\n")
+    return lines
+
+
+def _length(error_m: float) -> str:
+    return f"{error_m:.2f} m" if math.isfinite(error_m) else "no answer"
+
+
+def _grown(growth: Growth) -> str:
+    start = f"{growth.before_m:.2f} m {JUST_BEFORE_S:g} s before"
+    return f"{start}, {growth.scans_m:+.2f} m by scans, {growth.between_m:+.2f} m between them"
