@@ -6,16 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.colours import ANCHOR, REFUSED
-from benchmarks.metrics.fates import fates_of
+from benchmarks.metrics.fates import Codes, fates_of
 from benchmarks.metrics.score import CHI_SQUARE_95
-from benchmarks.metrics.track import Floats
+from benchmarks.metrics.track import Flags, Floats, Stamps, Whole
 from benchmarks.review.canvas import STRONG, Canvas, Place, thinned
 from benchmarks.review.drawing import Drawing
 from benchmarks.review.heard import Heard
 from benchmarks.review.paths import draw_path
 from fusion import Reason, World
+from fusion.values import nanoseconds
 
 CIRCLE_OPACITY = 130
+CIRCLE_S = 1.0
+"""How long a reading is seen: readings this close together count as one view of the anchors."""
 PARTICLE_OPACITY, PARTICLE_PIXELS = (70, 200), (0.75, 2.25)
 """Opacity and radius of a particle without weight, and of the heaviest one of its cloud."""
 GHOST_THICKNESS = 0.5
@@ -80,18 +83,17 @@ def _draw_error_line(canvas: Canvas, place: Place, drawing: Drawing) -> None:
 
 
 def _draw_circles(canvas: Canvas, place: Place, world: World, readings: Heard, drawing: Drawing) -> None:
-    """Where each reading of the last update puts the robot, a circle around its anchor: in the anchor's yellow
-    when the estimator believed it wholly, vermillion when not at all.
+    """Where the newest reading of each anchor puts the robot, a circle around it: in the anchor's yellow when the
+    estimator believed it wholly, vermillion when not at all.
     """
     fates, rr = drawing.fates, canvas.rr
-    asked = ~fates.met(Reason.KIND_NOT_CONSUMED)
     radius_m = readings.radii(fates_of(drawing.lane.final))
-    drawn = asked & np.isfinite(radius_m)
-    if not drawn.any():
+    asked = np.flatnonzero(~fates.met(Reason.KIND_NOT_CONSUMED))
+    if not np.isfinite(radius_m[asked]).any():
         return
-    # An update none of whose readings makes a circle still takes away those of the one before.
-    updates, first = np.unique(drawing.fate_update[asked], return_index=True)
-    lengths = np.bincount(np.searchsorted(updates, drawing.fate_update[drawn]), minlength=len(updates))
+    end_ns = int(drawing.estimates.time_ns[-1])
+    time_ns, rows, lengths = newest(fates.time_ns[asked], fates.anchor[asked], np.isfinite(radius_m[asked]), end_ns)
+    drawn = asked[rows]
     position = {anchor.id: (anchor.x, anchor.y) for anchor in world.anchors}
     centers = np.array([position.get(name, (np.nan, np.nan)) for name in fates.names.tolist()])
     circles = {
@@ -100,7 +102,28 @@ def _draw_circles(canvas: Canvas, place: Place, world: World, readings: Heard, d
         "colors": weight_colours(fates.weight[drawn]),
     }
     canvas.style(place, rr.Ellipses2D.from_fields(line_radii=[-0.75]))
-    canvas.columns(place, fates.time_ns[asked][first], rr.Ellipses2D.columns(**circles).partition(lengths))
+    canvas.columns(place, time_ns, rr.Ellipses2D.columns(**circles).partition(lengths))
+
+
+def newest(time_ns: Stamps, anchor: Codes, drawn: Flags, end_ns: int) -> tuple[Stamps, Whole, Whole]:
+    """What is to be seen of readings (n,) in time order, as rows of a table: from when on [ns] (m,), up to ``end_ns``,
+    the readings seen then, row after row, and how many each row has (m,).
+
+    Of each anchor the newest, for `CIRCLE_S`: many devices tell one range a message. Those not ``drawn`` are not seen,
+    and hide what the anchor said before.
+    """
+    edges_ns = np.unique(np.concatenate([time_ns, time_ns + nanoseconds(CIRCLE_S)]))
+    edges_ns = edges_ns[edges_ns <= end_ns]
+    codes = np.unique(anchor)
+    seen = np.full((len(edges_ns), len(codes)), -1, dtype=np.int64)
+    for column, code in zip(seen.T, codes.tolist(), strict=True):
+        own = np.flatnonzero(anchor == code)
+        last = np.searchsorted(time_ns[own], edges_ns, side="right") - 1
+        young = (last >= 0) & (edges_ns - time_ns[own[last]] < nanoseconds(CIRCLE_S)) & drawn[own[last]]
+        column[young] = own[last[young]]
+    changed = np.append(True, (np.diff(seen, axis=0) != 0).any(axis=1))
+    seen = seen[changed]
+    return edges_ns[changed], seen[seen >= 0], (seen >= 0).sum(axis=1)
 
 
 def _draw_particles(canvas: Canvas, place: Place, drawing: Drawing) -> None:

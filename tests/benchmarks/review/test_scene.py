@@ -14,7 +14,7 @@ from benchmarks.colours import ESTIMATORS, colour_of
 from benchmarks.lane import run_lane
 from benchmarks.review.canvas import MOST_POSES, thinned
 from benchmarks.review.counterfactual import ghost_lane, without_anchor
-from benchmarks.review.estimator_layer import PARTICLE_PIXELS
+from benchmarks.review.estimator_layer import PARTICLE_PIXELS, newest
 from benchmarks.review.estimator_plots import NEES_BOUNDS
 from benchmarks.review.paths import mostly_jumps
 from benchmarks.review.scene import markdown, write_scene
@@ -202,7 +202,7 @@ def test_error_line_goes_from_the_estimate_to_the_truth(tmp_path):
     assert strips[4] == [[[2.0, 0.5], [2.0, 0.0]]]
 
 
-def test_circles_are_those_of_the_last_update_in_the_colour_of_their_weight(tmp_path):
+def test_circles_are_those_of_the_last_scan_in_the_colour_of_their_weight(tmp_path):
     chunks = review_of(tmp_path, "toy")
     path = "/map/estimate/toy/readings"
     _, centers = column(chunks, path, "centers")
@@ -214,6 +214,16 @@ def test_circles_are_those_of_the_last_update_in_the_colour_of_their_weight(tmp_
     assert np.allclose(half_sizes[0][1], radius_m)
     assert {tuple(row) for row in colours[::2]} == {(colours[0][0],) * 3}
     assert colours[0][0] != colours[1][0]
+
+
+def test_circles_are_of_every_anchor_heard_within_a_second_and_then_vanish():
+    # a, b, a again; c is of no use, and hides the circle that c had.
+    time_ns = np.array([0, 400, 600, 700, 900, 1100]) * 1_000_000
+    anchor, drawn = np.array([2, 0, 2, 1, 1, 0], dtype=np.int16), np.array([1, 1, 1, 1, 0, 1], dtype=bool)
+    at_ns, rows, lengths = newest(time_ns, anchor, drawn, 1_700_000_000)
+    seen = [sorted(row.tolist()) for row in np.split(rows, np.cumsum(lengths)[:-1])]
+    assert (at_ns / 1e6).tolist() == [0, 400, 600, 700, 900, 1100, 1600]
+    assert seen == [[0], [0, 1], [1, 2], [1, 2, 3], [1, 2], [2, 5], [5]]
 
 
 def test_claim_is_drawn_about_zero_and_the_error_on_it(tmp_path):
