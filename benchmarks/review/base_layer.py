@@ -9,9 +9,9 @@ import numpy as np
 from benchmarks.colours import ANCHOR, TRUTH, WALL, anchor_colour
 from benchmarks.metrics.track import Floats, Stamps
 from benchmarks.review.canvas import Canvas, thinned
-from benchmarks.review.cdf import CdfAxes, draw_axes
+from benchmarks.review.cdf import LEAST_M, CdfAxes, draw_axes, round_step
 from benchmarks.review.device_events import draw_device_events, worth_a_line
-from benchmarks.review.frame import Frame
+from benchmarks.review.frame import MARGIN, Frame
 from benchmarks.review.heard import Heard
 from benchmarks.review.paths import draw_path
 from benchmarks.review.raw_sensors import draw_raw_sensors, raw_series
@@ -22,9 +22,12 @@ ARROW_M = 0.75
 """Length of the arrow that shows the true heading."""
 
 
-def draw_base(canvas: Canvas, run: Run, readings: Heard, axes: CdfAxes | None, legend: tuple[float, float]) -> None:
+def draw_base(
+    canvas: Canvas, run: Run, frame: Frame, readings: Heard, axes: CdfAxes | None, legend: tuple[float, float]
+) -> None:
     """The base layer; ``axes``: of the error distribution, None without truth; ``legend``: the truth's place in it."""
     _draw_floor(canvas, run.world)
+    _draw_scale(canvas, frame)
     if run.truth is not None:
         canvas.label(["map", "legend", "truth"], "truth", TRUTH, legend)
         _draw_truth(canvas, run.truth)
@@ -59,6 +62,16 @@ def _draw_floor(canvas: Canvas, world: World) -> None:
     canvas.style(["map", "walls"], rr.LineStrips2D([border, *walls], colors=[WALL], radii=radii, draw_order=-20))
     for anchor in world.anchors:
         canvas.label(["map", "anchor", anchor.id], anchor.id, ANCHOR, (anchor.x, anchor.y))
+
+
+def _draw_scale(canvas: Canvas, frame: Frame) -> None:
+    """A bar of a round length below the floor: Rerun's 2D views have no axes."""
+    width_m = max(frame.x_max - frame.x_min, LEAST_M)
+    length_m = round_step(width_m / 4.0)
+    y = frame.y_min - 0.3 * MARGIN * width_m
+    bar = [(frame.x_min, y), (frame.x_min + length_m, y)]
+    look = {"colors": [TRUTH], "radii": [-1.0], "labels": [f"{length_m:g} m"], "show_labels": True}
+    canvas.style(["map", "scale"], canvas.rr.LineStrips2D([bar], **look))
 
 
 def _draw_truth(canvas: Canvas, truth: TruthTrack) -> None:

@@ -16,7 +16,17 @@ from benchmarks.review.estimator_plots import AXES
 from benchmarks.review.events import State
 from benchmarks.review.frame import TIMELINE, Frame
 from benchmarks.review.raw_sensors import SPEED, TURN_RATE
-from benchmarks.review.views import cdf_view, event_view, map_view, plot, score_view, state_view, table_view, tabs
+from benchmarks.review.views import (
+    cdf_view,
+    event_view,
+    map_view,
+    plot,
+    score_view,
+    state_view,
+    table_view,
+    tabs,
+    upward,
+)
 from fusion import Ranges, WifiScan
 from logs.run import Run
 
@@ -79,27 +89,59 @@ def _radio(run: Run) -> list[Any]:
 
 def _details(drawn: Sequence[Drawing]) -> list[Any]:
     """A tab for each estimator: does its error fit its claim, and what happened to it?"""
-    import rerun as rr
     import rerun.blueprint as rrb
 
     details = []
     for drawing in (drawing for drawing in drawn if not drawing.ghost):
         name, views = drawing.name, []
         if any(drawing.claims):
-            place = ["consistency", name]
-            axes = [
-                (f"{axis.name} error and ±1σ ({axis.unit})", rr.new_entity_path([*place, axis.name])) for axis in AXES
-            ]
-            nees = f"{name}: NEES; 95 % should lie between the lines"
-            views += [tabs([plot(title, origin, legend=False) for title, origin in axes])]
-            views += [plot(nees, rr.new_entity_path(["nees", name]), top=_nees_top(drawing), legend=False)]
-        if drawing.lane.clouds is not None:
-            effective = f"{name}: effective number of particles"
-            views += [plot(effective, rr.new_entity_path(["neff", name]), legend=False)]
+            views.append(tabs(_claims(drawing)))
+        # Behind each other, for four plots in a column are too low for the numbers on their axes.
+        honesty = _honesty(drawing)
+        views += [tabs(honesty)] if honesty else []
         views += [event_view(name)] if drawing.events.text else []
         if views:
             details.append(rrb.Vertical(*views, name=name))
     return details
+
+
+def _claims(drawing: Drawing) -> list[Any]:
+    """Each component of the error on what is claimed of it, all of either inside the plot."""
+    import rerun as rr
+
+    plots = []
+    for number, axis in enumerate(AXES):
+        title, place = f"{axis.name} error and ±1σ ({axis.unit})", ["consistency", drawing.name, axis.name]
+        low, high = (axis.factor * end for end in reach(drawing, number))
+        plots.append(plot(title, rr.new_entity_path(place), span=(low, high) if low < high else None, legend=False))
+    return plots
+
+
+def reach(drawing: Drawing, number: int) -> tuple[float, float]:
+    """From where to where a component of the error goes [m or rad], with the band of nine tenths of the claims: the
+    viewer looks at the errors alone, and a filter that does not know where it is may claim anything.
+    """
+    if drawing.errors is None:
+        return 0.0, 0.0
+    error, variance = drawing.errors.error[:, number], drawing.errors.variance[:, number]
+    error, claimed = error[np.isfinite(error)], np.sqrt(variance[np.isfinite(variance)])
+    band = quantile(claimed, 0.9) if len(claimed) else 0.0
+    low, high = float(error.min(initial=-band)), float(error.max(initial=band))
+    margin = 0.05 * (high - low)
+    return low - margin, high + margin
+
+
+def _honesty(drawing: Drawing) -> list[Any]:
+    """NEES, and of a cloud how many particles count."""
+    import rerun as rr
+
+    name, views = drawing.name, []
+    if any(drawing.claims):
+        title = f"{name}: NEES; 95 % should lie between the lines"
+        views.append(plot(title, rr.new_entity_path(["nees", name]), span=upward(_nees_top(drawing)), legend=False))
+    if drawing.lane.clouds is not None:
+        views.append(plot(f"{name}: effective particles", rr.new_entity_path(["neff", name]), legend=False))
+    return views
 
 
 def _nees_top(drawing: Drawing) -> float:
@@ -118,10 +160,10 @@ def _readings(run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
     for drawing in (drawing for drawing in drawn if drawing.gates):
         name = drawing.name
         weight = f"{name}: weight of readings, coloured as above"
-        views = [plot(weight, rr.new_entity_path(["weight", name]), top=1.0, legend=False)]
+        views = [plot(weight, rr.new_entity_path(["weight", name]), span=upward(1.0), legend=False)]
         if drawing.tells_nis:
             nis = f"{name}: NIS of readings; the line is exceeded once in twenty"
-            views.append(plot(nis, rr.new_entity_path(["nis", name]), top=NIS_SHOWN, legend=False))
+            views.append(plot(nis, rr.new_entity_path(["nis", name]), span=upward(NIS_SHOWN), legend=False))
         gates.append(rrb.Vertical(*views, name=name))
     return rrb.Vertical(*_radio(run), *([tabs(gates)] if gates else []), name="Radio")
 

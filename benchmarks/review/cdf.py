@@ -41,8 +41,7 @@ class CdfAxes(NamedTuple):
         """Axes that hold 95 % of the finite errors (n,) [m] of each estimator, in about `TICKS` round steps."""
         reach = [quantile(finite, 0.95) for own in errors_m if len(finite := own[np.isfinite(own)])]
         largest = max(HEADROOM * max(reach, default=1.0), LEAST_M)
-        power = 10.0 ** math.floor(math.log10(largest / TICKS))
-        step = next(nice * power for nice in NICE if nice * power * TICKS >= largest * (1.0 - 1e-9))
+        step = round_step(largest / TICKS)
         return cls(step * math.ceil(largest / step - 1e-9), step)
 
     def curve(self, errors_m: Floats) -> Floats:
@@ -53,6 +52,12 @@ class CdfAxes(NamedTuple):
         x = np.concatenate([[0.0], shown[corners], [self.error_max_m]]) * WIDTH / self.error_max_m
         y = np.concatenate([[0], corners + 1, [len(shown)]]) / max(len(errors_m), 1)
         return np.column_stack([x, y])
+
+
+def round_step(least: float) -> float:
+    """The least round number that is not below ``least``, which is positive."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(nice * power for nice in NICE if nice * power >= least * (1.0 - 1e-9))
 
 
 def draw_axes(canvas: Canvas, axes: CdfAxes) -> None:

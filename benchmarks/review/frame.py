@@ -15,6 +15,8 @@ UTC = "utc"
 """The same as date and time of day, where the stamps tell them."""
 UNIX_SINCE_NS = 1_000_000_000 * NANOSECONDS
 """Stamps from here on, September 2001, count from 1970: no clock that counts from its own start has run so long."""
+MARGIN = 0.06
+"""Free space around the floor, as a share of its width."""
 LEGEND = 0.24
 """Room for the legend to the right of the floor, as a share of its width."""
 

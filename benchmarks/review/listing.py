@@ -15,14 +15,17 @@ def told(moments: Sequence[Moment], run: Sequence[str], settings: Settings, seed
     """The worst moments as lines: what, why, and how to look at it; ``run``: the words that name it."""
     lines = []
     for moment in moments:
-        grown = "" if moment.growth is None or not math.isfinite(moment.error_m) else f" ({_grown(moment.growth)})"
-        facts = [*moment.causes, *(f"{name}: {_length(error_m)}" for name, error_m in moment.otherwise.items())]
-        lines.append(
-            f"{moment.estimator} at {moment.at_s:.2f} s: {_length(moment.error_m)}{grown}; {'; '.join(facts)}\n"
-        )
         params = settings.get(moment.estimator)
-        lines.append(f"    {review_command(run, moment.estimator, moment.at_s, params=params, seed=seed)}\n")
+        command = review_command(run, moment.estimator, moment.at_s, params=params, seed=seed)
+        lines += [f"{line(moment)}\n", f"    {command}\n"]
     return lines
+
+
+def line(moment: Moment) -> str:
+    """What happened, and why."""
+    grown = "" if moment.growth is None or not math.isfinite(moment.error_m) else f" ({_grown(moment.growth)})"
+    facts = [*moment.causes, *(f"{name}: {_length(error_m)}" for name, error_m in moment.otherwise.items())]
+    return f"{moment.estimator} at {moment.at_s:.2f} s: {_length(moment.error_m)}{grown}; {'; '.join(facts)}"
 
 
 def _length(error_m: float) -> str:

@@ -23,6 +23,8 @@ from benchmarks.review.estimator_layer import draw_on_map, thickness
 from benchmarks.review.estimator_plots import draw_over_time
 from benchmarks.review.frame import Frame
 from benchmarks.review.heard import heard
+from benchmarks.review.listing import line
+from benchmarks.review.moments import worst_moments
 from benchmarks.review.viewer import require_rerun
 from benchmarks.table import COLUMNS, Column, as_text, ranked
 from fusion import FusionError
@@ -50,8 +52,9 @@ def write_scene(output: Path, run: Run, lanes: Sequence[Lane], scores: Sequence[
         recording.send_recording_name(run.name)
         recording.send_property("run", rr.AnyValues(**properties(run, frame)))
         canvas = Canvas(rr, recording, frame.start_ns, frame.timelines)
-        draw_base(canvas, run, readings, axes, legend[0])
-        canvas.style(["scores"], rr.TextDocument(markdown(scores), media_type="text/markdown"))
+        draw_base(canvas, run, frame, readings, axes, legend[0])
+        text = markdown(scores) + _worst(run, drawn, frame.start_ns)
+        canvas.style(["scores"], rr.TextDocument(text, media_type="text/markdown"))
         for drawing, place in zip(drawn, legend[1:], strict=True):
             with _recording(layers[drawing.name], identity) if layers else nullcontext(recording) as own:
                 layer = canvas._replace(recording=own)
@@ -92,6 +95,13 @@ def _axes(drawn: Sequence[Drawing]) -> CdfAxes | None:
     """Axes for the estimators that are shown; None without truth."""
     errors = [drawing.score.errors.position for drawing in drawn if drawing.shown and drawing.score.errors is not None]
     return CdfAxes.around(errors) if errors else None
+
+
+def _worst(run: Run, drawn: Sequence[Drawing], start_ns: int) -> str:
+    """The worst moment of each estimator that is shown, as a list; empty where nothing is judged."""
+    shown = [drawing for drawing in drawn if drawing.shown and not drawing.ghost]
+    found = [moment for drawing in shown for moment in worst_moments(run, drawing, start_ns, 1)]
+    return "".join(["\nWorst moments\n\n", *(f"- {line(moment)}\n" for moment in found)]) if found else ""
 
 
 def markdown(scores: Sequence[Score]) -> str:

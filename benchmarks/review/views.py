@@ -10,13 +10,11 @@ from typing import Any
 from benchmarks.colours import GROUND
 from benchmarks.review.cdf import WIDTH
 from benchmarks.review.drawing import Drawing
-from benchmarks.review.frame import LEGEND, TIMELINE, Frame
+from benchmarks.review.frame import LEGEND, MARGIN, TIMELINE, Frame
 from logs.run import Run
 
 TRAIL_S = 10.0
 """How far back the strong part of a track goes."""
-MARGIN = 0.06
-"""Free space around the floor, as a share of its width."""
 
 
 def tabs(views: Sequence[Any]) -> Any:  # noqa: ANN401 - Rerun's own values, here and below
@@ -37,13 +35,20 @@ def map_view(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: 
         y_range=[-frame.y_max - margin, -frame.y_min + margin],
     )
     return rrb.Spatial2DView(
-        name=f"{run.name}: tracks (m, y up), 95 % ellipses",
+        name=_map_title(run, drawn),
         origin="/",
         contents="/map/**",
         background=list(GROUND),
         visual_bounds=bounds,
         overrides=_overrides(frame, drawn),
     )
+
+
+def _map_title(run: Run, drawn: Sequence[Drawing]) -> str:
+    """What is drawn, and whose judgement the circles are coloured by."""
+    judge = next((drawing.name for drawing in drawn if drawing.gates), None)
+    circles = "" if judge is None else f", circles: readings, yellow where {judge} took them"
+    return f"{run.name}: tracks (m, y up), 95 % ellipses{circles}"
 
 
 def _overrides(frame: Frame, drawn: Sequence[Drawing]) -> dict[Any, Any]:
@@ -103,8 +108,13 @@ def _whole_run() -> Any:  # noqa: ANN401
     return rrb.TimeAxis(view_range=whole)
 
 
-def plot(name: str, origin: str, *, top: float | None = None, legend: bool = True) -> Any:  # noqa: ANN401
-    """A plot of the whole run; ``top``: its values are in [0, top]."""
+def upward(top: float) -> tuple[float, float]:
+    """The span of an axis whose values are in [0, top]."""
+    return -0.04 * top, 1.04 * top
+
+
+def plot(name: str, origin: str, *, span: tuple[float, float] | None = None, legend: bool = True) -> Any:  # noqa: ANN401
+    """A plot of the whole run; ``span``: from where to where its values go, by what the viewer sees if None."""
     import rerun.blueprint as rrb
     from rerun.blueprint.archetypes import PlotBackground
 
@@ -112,7 +122,7 @@ def plot(name: str, origin: str, *, top: float | None = None, legend: bool = Tru
         name=name,
         origin=origin,
         axis_x=_whole_run(),
-        axis_y=None if top is None else rrb.ScalarAxis(range=(-0.04 * top, 1.04 * top)),
+        axis_y=None if span is None else rrb.ScalarAxis(range=span),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
         background=PlotBackground(color=list(GROUND)),
     )

@@ -12,8 +12,10 @@ from benchmarks.cell import Cell, score_lane
 from benchmarks.clouds import MOST_POINTS, CloudWatch
 from benchmarks.colours import ESTIMATORS, colour_of
 from benchmarks.lane import run_lane
+from benchmarks.review.blueprint import reach
 from benchmarks.review.canvas import MOST_POSES, thinned
 from benchmarks.review.counterfactual import ghost_lane, without_anchor
+from benchmarks.review.drawing import drawings
 from benchmarks.review.estimator_layer import PARTICLE_PIXELS, newest
 from benchmarks.review.estimator_plots import NEES_BOUNDS
 from benchmarks.review.paths import mostly_jumps
@@ -236,6 +238,33 @@ def test_claim_is_drawn_about_zero_and_the_error_on_it(tmp_path):
     assert np.allclose(np.ravel(error), 0.5)
     _, heading = column(chunks, "/consistency/toy/heading/claim", "variances")
     assert np.allclose(np.sqrt(np.ravel(heading)), np.degrees(0.1)), "in degrees"
+
+
+def test_plot_of_an_error_has_room_for_the_band_that_is_claimed(tmp_path):
+    run = run_of(tmp_path)
+    (drawing,) = drawings(run, *scored(run, ["toy"]))
+    for number, error in ((0, 0.0), (1, 0.5)):
+        low, high = reach(drawing, number)
+        assert low < -0.2  # the estimator claims a standard deviation of 0.2 m
+        assert high > max(0.2, error)
+
+
+def test_worst_moments_stand_below_the_scores_and_nothing_does_without_truth(tmp_path):
+    def text(chunks):
+        (batch,) = chunks["/scores"]
+        (field,) = [field for field in batch.schema.names if field.endswith("text")]
+        return batch.column(field).to_pylist()[0][0]
+
+    assert "- toy at 0.00 s: 0.50 m" in text(review_of(tmp_path, "toy"))
+    assert "Worst" not in text(review_of(tmp_path, "toy", with_truth=False))
+
+
+def test_map_has_a_scale_of_a_round_length(tmp_path):
+    (batch,) = review_of(tmp_path, "toy")["/map/scale"]
+    values = {name.partition(":")[2]: batch.column(name).to_pylist()[0] for name in batch.schema.names if ":" in name}
+    ((start, end),) = values["strips"]
+    assert np.hypot(*np.subtract(end, start)) == pytest.approx(2.0)  # the floor is 8 m wide
+    assert values["labels"] == ["2 m"]
 
 
 def test_nees_lies_beside_its_bounds_of_three_degrees(tmp_path):
