@@ -17,7 +17,7 @@ from benchmarks.metrics.track import Flags
 from benchmarks.review.drawing import Drawing
 from benchmarks.review.events import OWN_REFUSALS
 from benchmarks.review.pulls import Growth, growth, misreadings
-from fusion import Decision, Odometry, Reason, Update, WheelTicks, World
+from fusion import Decision, Odometry, Reason, Update, WheelTicks
 from fusion.values import nanoseconds, seconds
 from logs.run import Run
 
@@ -84,7 +84,7 @@ def _causes(run: Run, drawing: Drawing, recent: Sequence[Update], at_ns: int) ->
     if drawing.gates:
         yield from _of_reception(drawing.fates, at_ns)
         yield from _of_judgement(drawing.fates, at_ns)
-        yield from _of_truth(run.world, drawing, recent)
+        yield from _of_truth(run, drawing, recent)
     else:
         yield "uses no radio"
     yield from _of_motion(run, at_ns)
@@ -152,17 +152,19 @@ def _of_judgement(fates: FateColumns, at_ns: int) -> Iterator[str]:
         yield f"{fates.names[fates.source[worst]]} taken with NIS {fates.nis[worst]:.1f}"
 
 
-def _of_truth(world: World, drawing: Drawing, recent: Sequence[Update]) -> Iterator[str]:
+def _of_truth(run: Run, drawing: Drawing, recent: Sequence[Update]) -> Iterator[str]:
     """The anchor that misled most, and those that were right and not believed."""
     if drawing.instants is None:
         return
-    found = list(misreadings(world, recent, FateColumns.of(recent), drawing.instants))
-    misled = [one for one in found if one.taken > 0.0 and one.sigmas >= MISLEADING]
+    found = list(misreadings(run.world, recent, drawing.instants))
+    misled = [one for one in found if one.taken and one.sigmas >= MISLEADING]
     if misled:
         worst = max(misled, key=lambda one: one.sigmas)
         side = "farther" if worst.farther_m > 0.0 else "nearer"
-        yield f"believed {worst.anchor}, {abs(worst.farther_m):.2f} m {side} than it was ({worst.sigmas:.1f}σ)"
-    right = [one.anchor for one in found if one.taken == 0.0 and one.sigmas < MISLEADING]
+        what = f"one reading of {worst.anchor}" if worst.alone else worst.anchor
+        yield f"believed {what}, {abs(worst.farther_m):.2f} m {side} than it was ({worst.sigmas:.1f}σ)"
+    believed = {one.anchor for one in found if one.taken}
+    right = [one.anchor for one in found if one.sigmas < MISLEADING and one.anchor not in believed]
     if right:
         yield f"did not believe {', '.join(right)}, though right"
 
@@ -172,11 +174,12 @@ def _reasons(fates: FateColumns, chosen: Flags) -> str:
 
 
 def _of_motion(run: Run, at_ns: int) -> Iterator[str]:
-    stamps = [m.time_ns for m in run.measurements if isinstance(m, WheelTicks | Odometry) and m.time_ns <= at_ns]
-    if not stamps:
-        yield "no odometry yet"
-    elif at_ns - max(stamps) > nanoseconds(SILENCE_S):
-        yield f"no odometry for {_length(at_ns - max(stamps))}"
+    stamps = [m.time_ns for m in run.measurements if isinstance(m, WheelTicks | Odometry)]
+    last_ns = max((stamp for stamp in stamps if stamp <= at_ns), default=None)
+    if last_ns is None:
+        yield "no odometry yet" if stamps else "no odometry in this run"
+    elif at_ns - last_ns > nanoseconds(SILENCE_S):
+        yield f"no odometry for {_length(at_ns - last_ns)}"
 
 
 def _length(duration_ns: int) -> str:

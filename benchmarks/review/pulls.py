@@ -7,7 +7,7 @@ against what the world's model gives for the true place: that tells the anchor t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -15,10 +15,12 @@ import numpy as np
 
 from benchmarks.metrics.bound import Places, model_of
 from benchmarks.metrics.course import Instants
-from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.instants import MAX_AGE_S, interpolate_truth
 from benchmarks.metrics.track import Floats
-from fusion import Anchor, Decision, RangeReading, Ranges, RssiReading, Update, WifiScan, World
+from fusion import Anchor, Decision, RangeReading, Ranges, Reason, RssiReading, Update, WifiScan, World
+
+OUTLIER = 3.0
+"""Standard deviations from which a single reading is worth a word, where all together were right."""
 
 
 class Growth(NamedTuple):
@@ -30,14 +32,16 @@ class Growth(NamedTuple):
 
 
 class Misreading(NamedTuple):
-    """Readings of one anchor, on average: how much farther [m] than it was they put it, how many standard deviations of
-    one reading they were off, either way, by all that the world says of noise, and the share of them that was taken.
+    """Readings of one anchor that were all taken, or all not, on average: how much farther [m] than it was they put it,
+    and how many standard deviations of one reading they were off, either way, by all that the world says of noise.
+    ``alone``: it is the one outlier among others that were right.
     """
 
     anchor: str
+    taken: bool
     farther_m: float
     sigmas: float
-    taken: float
+    alone: bool = False
 
 
 def growth(updates: Sequence[Update], truth: Instants) -> Growth | None:
@@ -57,21 +61,37 @@ def growth(updates: Sequence[Update], truth: Instants) -> Growth | None:
     return Growth(errors_m[judged[0]], scans_m, between_m)
 
 
-def misreadings(world: World, updates: Sequence[Update], fates: FateColumns, truth: Instants) -> Iterator[Misreading]:
-    """Of each anchor that was heard in ``updates``, whose last word are ``fates``, in the order of the world."""
-    scans = [update.measurement for update in updates if isinstance(update.measurement, WifiScan | Ranges)]
-    x, y, heading = _truth_at(truth, [scan.time_ns for scan in scans]).T
+def misreadings(world: World, updates: Sequence[Update], truth: Instants) -> Iterator[Misreading]:
+    """Of each anchor that was listened to in ``updates``, in the order of the world."""
+    off = _readings_off(world, updates, truth)
+    for (anchor, taken), rows in off.items():
+        farther_m, sigmas = np.mean(rows, axis=0).tolist()
+        alone_m, alone_sigmas = max(rows, key=lambda row: abs(row[1]))
+        if abs(sigmas) < OUTLIER / 3.0 and abs(alone_sigmas) >= OUTLIER:
+            yield Misreading(anchor, taken, alone_m, abs(alone_sigmas), alone=True)
+        else:
+            yield Misreading(anchor, taken, farther_m, abs(sigmas))
+
+
+def _readings_off(
+    world: World, updates: Sequence[Update], truth: Instants
+) -> Mapping[tuple[str, bool], list[tuple[float, float]]]:
+    """By anchor and whether they were taken: how far off each reading was, see `_off`."""
+    scans = [(u.measurement, u.fates) for u in updates if isinstance(u.measurement, WifiScan | Ranges)]
+    x, y, heading = _truth_at(truth, [scan.time_ns for scan, _ in scans]).T
     # A heading that is not known misplaces an antenna by its distance from the robot's middle at most.
     places = Places.of_poses(world, x, y, np.nan_to_num(heading))
-    for anchor in world.anchors:
-        heard = [
-            (i, reading) for i, scan in enumerate(scans) for reading in scan.readings if reading.anchor == anchor.id
-        ]
-        off = np.array([_off(anchor, reading, places, i) for i, reading in heard]).reshape(-1, 2)
-        off = off[np.isfinite(off).all(axis=1)]
-        if len(off):
-            farther_m, sigmas = off.mean(axis=0).tolist()
-            yield Misreading(anchor.id, farther_m, abs(sigmas), _taken(fates, anchor.id))
+    anchors = {anchor.id: anchor for anchor in world.anchors}
+    found: dict[tuple[str, bool], list[tuple[float, float]]] = {}
+    for i, (scan, fates) in enumerate(scans):
+        readings = {reading.anchor: reading for reading in scan.readings}
+        judged = [fate for fate in fates if fate.reason is not Reason.KIND_NOT_CONSUMED]
+        for fate in (fate for fate in judged if fate.anchor in anchors and fate.anchor in readings):
+            off = _off(anchors[fate.anchor], readings[fate.anchor], places, i)
+            if math.isfinite(off[1]):
+                taken = fate.decision in (Decision.USED, Decision.DOWNWEIGHTED)
+                found.setdefault((fate.anchor, taken), []).append(off)
+    return found
 
 
 def _off(anchor: Anchor, reading: RssiReading | RangeReading, places: Places, i: int) -> tuple[float, float]:
@@ -83,11 +103,6 @@ def _off(anchor: Anchor, reading: RssiReading | RangeReading, places: Places, i:
     std = math.hypot(model.std, model.bias_std, model.gain_std * float(model.by_gain(distance_m)))
     off = (value - float(model.expected(distance_m))) / std if std > 0.0 else math.nan
     return float(model.distance(value)) - distance_m, off
-
-
-def _taken(fates: FateColumns, anchor: str) -> float:
-    own = fates.names[fates.anchor] == anchor
-    return float(fates.met(Decision.USED, Decision.DOWNWEIGHTED)[own].mean()) if own.any() else 0.0
 
 
 def _truth_at(truth: Instants, time_ns: Sequence[int]) -> Floats:

@@ -210,3 +210,29 @@ def test_growth_of_the_error_is_shared_out_among_scans_and_the_time_between_them
     assert alone.growth == Growth(1.0, 5.0, 0.0)
     silent = moment_of(tmp_path, lambda s: all_taken(s) if s < 30 else [])
     assert silent.growth == Growth(1.0, 0.0, 5.0)
+
+
+def test_only_what_was_taken_is_said_to_have_misled(tmp_path):
+    def judge(second):
+        return [("a", *(GATED if second % 2 else TAKEN), 1.0), *all_taken(second)[1:]]
+
+    moment = moment_of(tmp_path, judge, off_m=lambda s, anchor: 9.0 if anchor == "a" and s % 2 else 0.0)
+    assert moment.causes == ("nothing unusual in the readings",)
+
+
+def test_one_outlier_among_readings_that_are_right_is_named(tmp_path):
+    moment = moment_of(tmp_path, all_taken, off_m=lambda s, anchor: 1.0 if anchor == "a" and s == 30 else 0.0)
+    assert moment.causes == (
+        f"believed one reading of a, 1.00 m farther than it was ({1.0 / np.hypot(0.15, 0.15):.1f}σ)",
+    )
+
+
+def test_kind_that_is_not_listened_to_misleads_nobody(tmp_path):
+    ignored = Decision.UNUSABLE, Reason.KIND_NOT_CONSUMED
+    moment = moment_of(tmp_path, lambda s: [("a", *(TAKEN if s < 9 else ignored), 1.0)], off_m=lambda *_: 9.0)
+    assert not any("believe" in cause for cause in moment.causes)
+
+
+def test_run_without_odometry_is_told_from_one_that_has_not_begun(tmp_path):
+    assert moment_of(tmp_path, all_taken, odometry=lambda _: False).causes == ("no odometry in this run",)
+    assert moment_of(tmp_path, all_taken, odometry=lambda s: s > 35).causes == ("no odometry yet",)
