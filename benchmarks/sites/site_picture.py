@@ -118,17 +118,28 @@ def _walls(axes: Axes, plan: Plan) -> None:
 
 def _anchors(axes: Axes, plan: Plan) -> None:
     """Triangles, each named on the side where the floor is."""
-    bounds = plan.world.bounds
+    bounds, scale = plan.world.bounds, _scale(len(plan.world.anchors))
     for place, anchor in enumerate(plan.world.anchors):
         label = None if place else "anchor"
-        axes.plot(anchor.x, anchor.y, "^", color=INK, mec=HALO, ms=12, ls="", clip_on=False, zorder=5, label=label)
+        axes.plot(
+            anchor.x, anchor.y, "^", color=INK, mec=HALO, ms=12 * scale, ls="", clip_on=False, zorder=5, label=label
+        )
         right = anchor.x > 0.5 * (bounds.x_min + bounds.x_max)
         upper = anchor.y > 0.5 * (bounds.y_min + bounds.y_max)
-        aside = (-9.0 if right else 9.0, -4.0 if upper else 4.0)
+        aside = ((-9.0 if right else 9.0) * scale, (-4.0 if upper else 4.0) * scale)
         text = axes.annotate(anchor.id, (anchor.x, anchor.y), aside, textcoords="offset points", zorder=6)
         text.set(
-            ha="right" if right else "left", va="top" if upper else "bottom", path_effects=_halo(3.0), weight="bold"
+            ha="right" if right else "left",
+            va="top" if upper else "bottom",
+            path_effects=_halo(3.0 * scale),
+            weight="bold",
         )
+        text.set_fontsize(10.0 * scale)
+
+
+def _scale(count: int) -> float:
+    """How large so many anchors and their names are drawn: as ever up to a dozen, then smaller, but to be read."""
+    return float(np.clip(np.sqrt(12.0 / count), 0.55, 1.0))
 
 
 def _proposal(axes: Axes, plan: Plan, proposal: Proposal) -> None:

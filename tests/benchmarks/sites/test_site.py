@@ -200,3 +200,16 @@ def test_source_that_is_not_there_is_named(tmp_path):
 def test_record_that_cannot_be_written_is_told(hall, tmp_path, capsys):
     assert main(["bound", str(hall), "--step", "2", "--json", str(tmp_path)]) == 1
     assert "cannot be written" in capsys.readouterr().err
+
+
+def test_of_many_anchors_those_that_would_be_missed_most_are_in_the_table(tmp_path, capsys):
+    ring = [(math.cos(k), math.sin(2.0 * k)) for k in range(20)]
+    rows = "".join(f'[[anchors]]\nid = "a{i}"\nposition_m = [{9 * x}, {9 * y}]\n' for i, (x, y) in enumerate(ring))
+    (tmp_path / "w.toml").write_text(rows)
+    plan = plan_site(tmp_path / "w.toml", step_m=2.0)
+    (table,) = [sheet for sheet in sheets(plan) if sheet.title.startswith("When one anchor falls silent")]
+    shown = {row[0] for row in table.rows}
+    assert table.title.endswith("(the worst 12 of 20)")
+    assert len(shown) == 12
+    left_out = max(spread.p95_m for name, spread in plan.losses.items() if name not in shown)
+    assert left_out <= min(plan.losses[name].p95_m for name in shown)

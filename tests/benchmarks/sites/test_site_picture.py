@@ -51,6 +51,20 @@ def test_anchors_axes_colours_and_proposals_are_labelled(plan):
     assert any(text.endswith(" m") and text[0].isdigit() for text in shown), "contours are labelled"
 
 
+def test_names_of_a_hundred_anchors_can_be_told_apart(tmp_path):
+    table = "".join(
+        f'[[anchors]]\nid = "a{i:02d}"\nposition_m = [{4.0 * (i % 10)}, {3.0 * (i // 10) + 0.7 * (i % 3)}]\n'
+        for i in range(100)
+    )
+    (tmp_path / "w.toml").write_text(table)
+    figure = site_picture.picture(plan_site(tmp_path / "w.toml", step_m=4.0))
+    figure.draw_without_rendering()
+    names = [text for text in figure.axes[0].texts if text.get_text().startswith("a")]
+    boxes = [text.get_window_extent() for text in names]
+    assert len(boxes) == 100
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+
+
 def test_map_walls_and_anchors_stand_in_their_places(plan):
     figure = site_picture.picture(plan)
     axes = figure.axes[0]
