@@ -16,7 +16,7 @@ from benchmarks.metrics.peaks import peaks
 from benchmarks.metrics.track import Flags
 from benchmarks.review.drawing import Drawing
 from benchmarks.review.events import OWN_REFUSALS
-from benchmarks.review.pulls import Growth, growth, misreadings
+from benchmarks.review.pulls import MISLEADING, Growth, growth, misreadings
 from fusion import Decision, Odometry, Reason, Update, WheelTicks
 from fusion.values import nanoseconds, seconds
 from logs.run import Run
@@ -31,9 +31,6 @@ TOGETHER_S = 1.0
 """Readings this close together count as one view of the anchors."""
 SURPRISING_NIS = 9.0
 """Three standard deviations: a reading so far off that was believed all the same."""
-
-MISLEADING = 1.0
-"""Standard deviations by which an anchor's readings are off, on average, before they are said to have misled."""
 
 
 class Moment(NamedTuple):

@@ -19,6 +19,8 @@ from benchmarks.metrics.instants import MAX_AGE_S, interpolate_truth
 from benchmarks.metrics.track import Floats
 from fusion import Anchor, Decision, RangeReading, Ranges, Reason, RssiReading, Update, WifiScan, World
 
+MISLEADING = 1.0
+"""Standard deviations by which an anchor's readings are off, on average, before they are said to have misled."""
 OUTLIER = 3.0
 """Standard deviations from which a single reading is worth a word, where all together were right."""
 
@@ -62,12 +64,12 @@ def growth(updates: Sequence[Update], truth: Instants) -> Growth | None:
 
 
 def misreadings(world: World, updates: Sequence[Update], truth: Instants) -> Iterator[Misreading]:
-    """Of each anchor that was listened to in ``updates``, in the order of the world."""
+    """Of each anchor that was listened to in ``updates``, in the order they were first heard."""
     off = _readings_off(world, updates, truth)
     for (anchor, taken), rows in off.items():
         farther_m, sigmas = np.mean(rows, axis=0).tolist()
         alone_m, alone_sigmas = max(rows, key=lambda row: abs(row[1]))
-        if abs(sigmas) < OUTLIER / 3.0 and abs(alone_sigmas) >= OUTLIER:
+        if abs(sigmas) < MISLEADING and abs(alone_sigmas) >= OUTLIER:
             yield Misreading(anchor, taken, alone_m, abs(alone_sigmas), alone=True)
         else:
             yield Misreading(anchor, taken, farther_m, abs(sigmas))
