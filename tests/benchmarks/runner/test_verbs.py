@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,10 +12,11 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics.score import METRICS_VERSION
+from benchmarks.runner.baseline import read_baseline
 from benchmarks.runner.compare_verb import stored_results
 from benchmarks.runner.definition import Contestant, FaultSet, Gate, RunSource, load_suite
 from benchmarks.runner.export_verb import as_junit, as_latex
-from benchmarks.runner.gate_verb import Outcome, judge, read_baseline
+from benchmarks.runner.gate_verb import Outcome, judge
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import comparison, flat, score_matrix
 from benchmarks.runner.run_verb import run_suite
@@ -148,6 +150,55 @@ def test_a_cell_that_is_lost_now_and_was_not_before_is_a_regression(results):
 def test_contestant_that_the_baseline_does_not_know_cannot_be_told(results):
     known = {"wheels": baseline_of(results)["wheels"]}
     assert Outcome.CANNOT_TELL in outcomes(judge(results, Gate(ratio={"pos_p75": 0.05}), known))
+
+
+def test_gate_pairs_with_its_baseline_by_run_not_by_row(results):
+    gate, before = Gate(ratio={"pos_p75": 0.05}), baseline_of(results)
+    backwards = {name: rows[::-1] for name, rows in before.items()}
+    assert outcomes(judge(results, gate, backwards)) == {Outcome.PASS}
+    elsewhere = {
+        name: [{**row, "run": f"{row['run']}-of-another-hall"} for row in rows] for name, rows in before.items()
+    }
+    assert outcomes(judge(results, gate, elsewhere)) == {Outcome.CANNOT_TELL}
+    shorter = [result for result in results if result.cell.run.id != "run3"]
+    assert outcomes(judge(shorter, gate, before)) == {Outcome.CANNOT_TELL}
+    tuned = {name: [*rows, {**rows[0], "run": "tuning", "split": "tune"}] for name, rows in before.items()}
+    assert outcomes(judge(results, gate, tuned)) == {Outcome.PASS}
+
+
+def test_run_whose_score_became_infinite_is_a_regression(results):
+    found = judge(scaled(results, "wheels", [1.0] * 7 + [np.inf]), Gate(ratio={"pos_p75": 0.05}), baseline_of(results))
+    assert [one.outcome for one in found] == [Outcome.REGRESSION, Outcome.PASS]
+    assert "1 of 8 runs" in found[0].text
+
+
+def test_scores_of_zero_have_no_ratio(results):
+    found = judge(scaled(results, "wheels", [0.0] * 8), Gate(ratio={"pos_p75": 0.05}), baseline_of(results))
+    assert [one.outcome for one in found] == [Outcome.USAGE, Outcome.PASS]
+
+
+@pytest.mark.parametrize("silent", [0, -1])
+def test_cell_that_says_nothing_hides_behind_no_other(results, silent):
+    spoilt = list(results)
+    spoilt[silent] = results[silent]._replace(metrics={**results[silent].metrics, "availability": math.nan})
+    assert Outcome.CANNOT_TELL in outcomes(judge(spoilt, Gate(floor={"availability": 0.9}), None))
+    spoilt[silent] = spoilt[silent]._replace(status="crashed")
+    assert Outcome.REGRESSION in outcomes(judge(spoilt, Gate(floor={"availability": 0.9}), None))
+
+
+def test_gate_that_asks_for_a_ratio_does_not_pass_without_a_baseline(place, capsys):
+    assert main(words(place, "gate")) == Outcome.NOT_MEASURED
+    assert "give --baseline" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("spoil", [{"pos_p75": "high"}, {"pos_p75": math.nan}, {"pos_p75": True}, "twice"])
+def test_rows_of_a_baseline_that_make_no_sense_are_told(place, results, spoil, tmp_path, capsys):
+    rows = [flat(result) for result in results]
+    rows = [*rows, rows[0]] if spoil == "twice" else [{**rows[0], **spoil}, *rows[1:]]
+    path = tmp_path / "base.json"
+    path.write_text(json.dumps({"metrics_version": METRICS_VERSION, "results": rows}), encoding="utf-8")
+    assert main(words(place, "gate", "--baseline", str(path))) == Outcome.USAGE
+    assert "baseline" in capsys.readouterr().out
 
 
 def test_gate_answers_with_the_exit_code_of_its_gravest_finding(place, tmp_path, capsys):
