@@ -24,6 +24,7 @@ from benchmarks.runner.results import ALIVE, Result, by_contestant, read_results
 from benchmarks.runner.store import Store
 from benchmarks.runner.verify_verb import differing
 from benchmarks.statistics.verdict import compare
+from benchmarks.workers import Limits
 from fusion import FusionError
 
 
@@ -174,7 +175,7 @@ def _findings(arguments: argparse.Namespace) -> list[Finding]:
         found.append(Finding(Outcome.NOT_MEASURED, f"gate.ratio ({asked}) compares with a baseline; give --baseline"))
     found += [
         Finding(Outcome.NOT_DETERMINISTIC, f"{cell}: computed again, it differs")
-        for cell in differing(cells, store, arguments.verify)
+        for cell in differing(cells, store, arguments.verify, Limits(suite.limits.wall_s, suite.limits.rss_mb))
     ]
     if suite.gate.inconclusive == "warn":
         found = [one._replace(outcome=Outcome.PASS) if one.outcome is Outcome.CANNOT_TELL else one for one in found]

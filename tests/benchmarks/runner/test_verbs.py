@@ -4,7 +4,6 @@ import csv
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
@@ -21,9 +20,10 @@ from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import comparison, flat, score_matrix
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.time_verb import peak_mb
+from benchmarks.runner.time_verb import measure
 from benchmarks.runner.verify_verb import differing
 from benchmarks.sheet import Sheet
+from benchmarks.workers import Limits
 from fusion.cli import main
 
 HEAD = '[suite]\nname = "verbs"\n'
@@ -270,10 +270,10 @@ def test_verify_finds_the_cell_that_was_tampered_with(place, tmp_path, capsys):
     assert main(["bench", "verify", str(place / "suite.toml"), "--store", str(store.folder)]) == 3
     run_suite(cut, store, workers=1)
     cells = cells_of(cut, store)
-    assert differing(cells, store, 10) == []
+    assert differing(cells, store, 10, Limits()) == []
     track = store.place("estimates", cells[1].estimate_key) / "track.npz"
     track.write_bytes((store.place("estimates", cells[0].estimate_key) / "track.npz").read_bytes())
-    assert [str(cell) for cell in differing(cells, store, 10)] == [str(cells[1])]
+    assert [str(cell) for cell in differing(cells, store, 10, Limits())] == [str(cells[1])]
     assert main(["bench", "verify", str(place / "suite.toml"), "--store", str(store.folder)]) == 5
     assert "it differs" in capsys.readouterr().out
 
@@ -299,13 +299,17 @@ def test_verbs_refuse_a_suite_that_is_not_done(place, tmp_path, capsys):
         assert "0 of 16 cells are there; run `fusion bench run` first" in capsys.readouterr().err
 
 
-def test_peak_memory_is_that_of_the_estimator_in_a_process_of_its_own():
+def test_peak_memory_is_that_of_the_estimator_in_a_process_of_its_own(tmp_path):
     """300 000 particles are three columns of 2.4 MB at the least; what this process holds is not counted."""
     held = np.ones(50_000_000)
-    few, many = (
-        peak_mb(RunSource("office", scenario="office", duration_s=1.0), Path(), Contestant("pf", "particle", params))
-        for params in ({"particles": 10}, {"particles": 300_000})
+    path = tmp_path / "suite.toml"
+    particles = [
+        f'[[estimators]]\nid = "{n}"\nuse = "particle"\nparams = {{ particles = {n} }}\n' for n in (10, 300_000)
+    ]
+    path.write_text(
+        '[suite]\nname = "t"\n[[runs]]\nid = "a"\nscenario = "office"\nduration_s = 1.0\n' + "".join(particles)
     )
+    few, many = (timing.rss_mb for timing in measure(load_suite(path), repeats=1))
     assert 10.0 < few < held.nbytes / 2**20
     assert many > few + 3 * 2.4e6 / 2**20
 
