@@ -20,12 +20,20 @@ from benchmarks.runner.baseline import Baseline, Row, counterparts, read_baselin
 from benchmarks.runner.definition import CLEAN, Gate, load_suite
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.plan_verb import suite_options
-from benchmarks.runner.results import ALIVE, Result, by_contestant, read_results, require_metric, score_matrix
+from benchmarks.runner.results import (
+    ALIVE,
+    MORE_IS_BETTER,
+    Result,
+    by_contestant,
+    read_results,
+    require_metric,
+    score_matrix,
+)
 from benchmarks.runner.store import Store
 from benchmarks.runner.verify_verb import differing
 from benchmarks.statistics.verdict import compare
 from benchmarks.workers import Limits
-from fusion import FusionError
+from fusion import FusionError, SuiteError
 
 
 @unique
@@ -169,6 +177,8 @@ def _findings(arguments: argparse.Namespace) -> list[Finding]:
     named = arguments.baseline or (suite.folder / suite.gate.baseline if suite.gate.baseline else None)
     for metric in {*suite.gate.ratio, *suite.gate.floor, *suite.gate.inside}:
         require_metric(metric, results)
+    for metric in filter(MORE_IS_BETTER.fullmatch, suite.gate.ratio):
+        raise SuiteError(f"gate.ratio.{metric}: more of it is better, so it may grow as it likes; give it a floor")
     found = judge(results, suite.gate, read_baseline(named) if named else None)
     if suite.gate.ratio and named is None:
         asked = ", ".join(suite.gate.ratio)

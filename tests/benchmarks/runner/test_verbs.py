@@ -98,6 +98,10 @@ def test_compare_says_in_a_sentence_who_is_better_or_that_it_cannot_tell(place, 
         (["wheelz"], "did you mean 'wheels'"),
         (["--metric", "pos_p755"], "did you mean 'pos_p75'"),
         (["--fault", "claen"], "did you mean 'clean'"),
+        (["--metric", "availability"], "a lower availability is not better"),
+        (["--metric", "anees"], "a lower anees is not better"),
+        (["wheels"], "name two or more"),
+        (["wheels", "wheels"], "name two or more"),
     ],
 )
 def test_compare_refuses_what_the_suite_does_not_have(place, more, message, capsys):
@@ -189,6 +193,13 @@ def test_cell_that_says_nothing_hides_behind_no_other(results, silent):
 def test_gate_that_asks_for_a_ratio_does_not_pass_without_a_baseline(place, capsys):
     assert main(words(place, "gate")) == Outcome.NOT_MEASURED
     assert "give --baseline" in capsys.readouterr().out
+
+
+def test_gate_limits_the_growth_of_nothing_that_should_grow(place, tmp_path, capsys):
+    text = (place / "suite.toml").read_text(encoding="utf-8").replace("pos_p75 = 0.05", "availability = 0.05")
+    (tmp_path / "suite.toml").write_text(text, encoding="utf-8")
+    assert main(["bench", "gate", str(tmp_path / "suite.toml"), "--store", str(place / "store")]) == Outcome.USAGE
+    assert "give it a floor" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("spoil", [{"pos_p75": "high"}, {"pos_p75": math.nan}, {"pos_p75": True}, "twice"])
