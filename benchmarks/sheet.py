@@ -52,12 +52,12 @@ def print_sheets(sheets: Sequence[Sheet], file: IO[str] | None = None) -> None:
 def as_markdown(sheet: Sheet) -> str:
     r"""A pipe table under its title in bold.
 
-    >>> print(as_markdown(Sheet("Sizes", ("what", "m"), (("a|b", "1"),))))
+    >>> print(as_markdown(Sheet("Sizes", ("what", "m"), (("a|b", "<1"),))))
     **Sizes**
     <BLANKLINE>
     | what | m |
     |---|--:|
-    | a\|b | 1 |
+    | a\|b | &lt;1 |
     """
     rules = ["---", *(["---" if sheet.prose else "--:"] * (len(sheet.head) - 1))]
     lines = [_row(sheet.head), "|" + "|".join(rules) + "|", *map(_row, sheet.rows)]
@@ -65,4 +65,4 @@ def as_markdown(sheet: Sheet) -> str:
 
 
 def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+    return "| " + " | ".join(cell.replace("<", "&lt;").replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"

@@ -38,6 +38,7 @@ def meet(truth: TruthTrack, track: Track, *, gap_s: float = GAP_S) -> Met:
     known = known_truth(truth)
     rows = _chosen(track, known)
     instants, kept = interpolate_truth(known, track.time_ns[rows], gap_s=gap_s)
+    kept &= np.count_nonzero(kept) > 1
     said, instants = track.at(rows[kept]), instants.at(kept)
     x, y, _ = said.pose.T
     now, unknown = np.zeros(len(x)), np.full(len(x), np.nan)

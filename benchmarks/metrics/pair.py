@@ -9,12 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.metrics.alignment import ALIGNMENTS, align
-from benchmarks.metrics.instants import GAP_S, MAX_AGE_S, RATE_HZ, evaluation_instants, match
+from benchmarks.metrics.instants import GAP_S, MAX_AGE_S, RATE_HZ, evaluation_instants, known_truth, match
 from benchmarks.metrics.interpolation import meet
 from benchmarks.metrics.score import absolute_metrics, errors, for_json, metrics
 from benchmarks.metrics.tracks import read_track, read_truth
 from fusion import LogError, ParameterError, Pose
 from fusion.errors import did_you_mean
+from fusion.values import nanoseconds
+from logs.run import TruthTrack
 
 MODES = ("causal", "interp")
 
@@ -78,7 +80,7 @@ def score_pair(
         instants = evaluation_instants(true, hz=hz, gap_s=gap_s)
         answers = match(instants, said, max_age_s=max_age_s)
     if not answers.valid.any():
-        raise LogError(f"{estimate}: no pose can be compared with {truth}; see that both have the same clock")
+        raise LogError(f"{estimate}: {_nothing_met(true, mode, gap_s)} (truth: {truth})")
     raw = {**metrics(errors(instants, answers, weight)), **availability}
     score = PairScore(str(truth), str(estimate), mode, alignment, raw)
     moved = None if alignment == "none" else align(instants, answers, alignment)
@@ -86,3 +88,13 @@ def score_pair(
         return score
     aligned = {**absolute_metrics(errors(instants, moved.answers, weight)), **availability}
     return score._replace(aligned=aligned, map_from_estimate=moved.map_from_estimate)
+
+
+def _nothing_met(truth: TruthTrack, mode: str, gap_s: float) -> str:
+    """Why nothing could be compared, and what to do."""
+    if mode != "interp":
+        return "no pose can be compared with the truth; see that both have the same clock"
+    known = known_truth(truth)
+    if len(known) > 1 and np.diff(known.time_ns).min() > nanoseconds(gap_s):
+        return f"truth is interpolated over {gap_s:g} s at most, and this one is sparser everywhere; use --mode causal"
+    return "fewer than two poses lie within the truth, and one stands for no time; see that both have the same clock"

@@ -28,7 +28,7 @@ from benchmarks.report.sensitivity import advice, curves, sensitivity, sweeps
 from benchmarks.runner.compare_verb import stored_results
 from benchmarks.runner.definition import CLEAN, TUNE
 from benchmarks.runner.plan_verb import suite_options
-from benchmarks.runner.results import RANKED_BY, judged, record, require_metric
+from benchmarks.runner.results import RANKED_BY, judged, record, require_lower_is_better, require_metric
 from benchmarks.runner.store import Store
 from benchmarks.sheet import Sheet, as_markdown
 from benchmarks.statistics.within_run import LEAST_INSTANTS, within_run
@@ -193,6 +193,7 @@ def run(arguments: argparse.Namespace) -> int:
     require_matplotlib()
     suite, results = stored_results(arguments)
     require_metric(arguments.metric, results)
+    require_lower_is_better(arguments.metric)
     material = Material(suite, results, Store(arguments.store), arguments.metric)
     targets = {}
     if arguments.markdown:

@@ -10,7 +10,14 @@ from typing import NoReturn
 from benchmarks.runner.definition import CLEAN, Suite, load_suite
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.plan_verb import suite_options
-from benchmarks.runner.results import RANKED_BY, Result, comparison, read_results, require_metric
+from benchmarks.runner.results import (
+    RANKED_BY,
+    Result,
+    comparison,
+    read_results,
+    require_lower_is_better,
+    require_metric,
+)
 from benchmarks.runner.store import Store
 from benchmarks.sheet import Sheet, print_sheets
 from benchmarks.statistics.verdict import Comparison, Verdict
@@ -91,3 +98,6 @@ def _require(arguments: argparse.Namespace, results: Sequence[Result]) -> None:
             if one not in known:
                 raise ParameterError(f"the suite has no {what} {one!r}; {did_you_mean(one, sorted(known))}")
     require_metric(arguments.metric, results)
+    require_lower_is_better(arguments.metric)
+    if len(ids) < 2 or len(set(arguments.estimators)) == 1:
+        raise ParameterError("one estimator alone is better than none; name two or more, or none for all of the suite")

@@ -5,6 +5,7 @@ A TOML file with nothing but data, read once and checked whole before any work. 
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -193,7 +194,7 @@ def load_suite(path: Path) -> Suite:
 
 def _checked(written: _File, path: Path) -> Suite:
     head = written.suite
-    _check_grids(written, path)
+    _check_parameters(written, path)
     contestants = tuple(each for estimator in written.estimators for each in estimator.combinations())
     faults = (FaultSet(CLEAN), *written.faults)
     for what, items in (("runs", written.runs), ("estimators", contestants), ("faults", faults)):
@@ -222,6 +223,8 @@ def _require_unique(ids: Sequence[str], where: str) -> None:
     if not ids:
         raise SuiteError(f"{where}: none given; a suite needs at least one")
     for number, one in enumerate(ids):
+        if not one:
+            raise SuiteError(f"{where}[{number}]: the id is empty; give it one")
         if one in ids[:number]:
             raise SuiteError(f"{where}: the id {one!r} is given twice; give each its own")
 
@@ -231,6 +234,12 @@ def _check_run(run: RunSource, where: str) -> None:
         raise SuiteError(f"{where}: give either mcap, a log, or scenario, a simulated run")
     if run.topics and run.world is None:
         raise SuiteError(f"{where}: topics are of a foreign bag, which needs a world too; our own logs need neither")
+    if run.scenario is None and (run.seed != 0 or run.duration_s is not None):
+        raise SuiteError(f"{where}: seed and duration_s are of a simulated run, a log is taken whole; leave them out")
+    if run.world is None and any(run.truth_to_map):
+        raise SuiteError(f"{where}: truth_to_map is of a foreign bag, which needs a world too; leave it out")
+    if run.seed < 0:
+        raise SuiteError(f"{where}.seed: {run.seed} is below 0; give 0 or more")
     if run.duration_s is not None:
         _require_above_zero(where, duration_s=run.duration_s)
     _require_one_of(run.split, (TUNE, TEST), f"{where}.split")
@@ -256,12 +265,16 @@ def _require_one_of(word: str, known: Sequence[str], where: str) -> None:
         raise SuiteError(f"{where}: {word!r} does not exist; {did_you_mean(word, known)}")
 
 
-def _check_grids(written: _File, path: Path) -> None:
-    """A grid without a value would make no contestant at all."""
+def _check_parameters(written: _File, path: Path) -> None:
+    """A grid without a value would make no contestant at all, and what is no number has no place in a key."""
     for estimator in written.estimators:
         for name, values in estimator.grid.items():
             if not values:
                 raise SuiteError(f"{path}: {estimator.id}: grid.{name} is empty; give its values, or leave it out")
+        given = [*estimator.params.items(), *((name, one) for name, own in estimator.grid.items() for one in own)]
+        for name, value in given:
+            if isinstance(value, float) and not math.isfinite(value):
+                raise SuiteError(f"{path}: {estimator.id}: {name} is {value}, not a finite number; give one")
 
 
 def _check_tuning(written: _File, path: Path) -> None:

@@ -19,7 +19,7 @@ from benchmarks.metrics.track import Track
 from benchmarks.review.frame import Frame
 from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.judge import judge
-from benchmarks.runner.plan import Cell, read_faults
+from benchmarks.runner.plan import Cell, has_estimate, read_faults
 from benchmarks.runner.reference import reference_of
 from benchmarks.runner.source import open_run
 from benchmarks.runner.store import Store, to_json
@@ -31,6 +31,9 @@ LOST = {
     Loss.TIMEOUT: "it took longer than limits.wall_s of the suite",
     Loss.OUT_OF_MEMORY: "it took more memory than limits.rss_mb of the suite",
 }
+
+BROKEN = {Loss.TIMEOUT.value: "wall_s", Loss.OUT_OF_MEMORY.value: "rss_mb"}
+"""The limit behind each loss that a greater one may spare."""
 
 
 class Done(NamedTuple):
@@ -54,7 +57,8 @@ def carry_out(task: tuple[Cell, Path]) -> str:
     """Make what is missing of one cell; answers its status. Raises for the run, never for the estimator."""
     cell, folder = task
     store = Store(folder)
-    if not store.has("estimates", cell.estimate_key):
+    if not has_estimate(cell, store):
+        _forget(cell, store)
         run = faulty_run(cell)
         keep(cell, store, fold(cell, run), run)
     return score(cell, store)
@@ -64,8 +68,16 @@ def give_up(task: tuple[Cell, Path], loss: Loss) -> str:
     """Keep what became of a cell whose process did not survive it: a failure is a result too."""
     cell, folder = task
     store = Store(folder)
+    if not has_estimate(cell, store):
+        _forget(cell, store)
     keep(cell, store, Lane(cell.contestant.use, (), "", 0.0, LOST[loss]), None, ended=loss.value)
     return score(cell, store)
+
+
+def _forget(cell: Cell, store: Store) -> None:
+    """Take away what became of a cell under a lesser limit."""
+    store.discard("scores", cell.score_key)
+    store.discard("estimates", cell.estimate_key)
 
 
 def fold(cell: Cell, run: Run) -> Lane:
@@ -94,10 +106,17 @@ def keep(cell: Cell, store: Store, lane: Lane, run: Run | None, ended: str = "cr
         "start_ns": None if run is None else Frame.around(run).start_ns,
         "fates": lane.fates.counts,
         "nis_mean": lane.fates.nis_mean,
+        **_broken_limit(cell, ended),
     }
     store.write(
         "estimates", cell.estimate_key, {"result.json": to_json(result), "track.npz": to_bytes(lane.track, lane.fates)}
     )
+
+
+def _broken_limit(cell: Cell, ended: str) -> dict[str, object]:
+    """Which limit of its suite ended the cell, and how much that was; nothing of one that ended by itself."""
+    name = BROKEN.get(ended)
+    return {} if name is None else {"broken_limit": {"name": name, "value": getattr(cell.limits, name)}}
 
 
 def stored_track(cell: Cell, store: Store) -> tuple[Track, FateColumns]:

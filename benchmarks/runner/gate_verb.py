@@ -5,27 +5,34 @@ tell, 5 not deterministic; of several the first of 2, 3, 5, 1, 4.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from enum import IntEnum, unique
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.arguments import at_least_one
-from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.metrics.track import Floats
-from benchmarks.page import data_of
+from benchmarks.runner.baseline import Baseline, Row, counterparts, read_baseline, scores
 from benchmarks.runner.definition import CLEAN, Gate, load_suite
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.plan_verb import suite_options
-from benchmarks.runner.results import ALIVE, Result, by_contestant, read_results, require_metric, score_matrix
+from benchmarks.runner.results import (
+    ALIVE,
+    MORE_IS_BETTER,
+    Result,
+    by_contestant,
+    read_results,
+    require_metric,
+    score_matrix,
+)
 from benchmarks.runner.store import Store
 from benchmarks.runner.verify_verb import differing
 from benchmarks.statistics.verdict import compare
+from benchmarks.workers import Limits
 from fusion import FusionError, SuiteError
 
 
@@ -58,10 +65,6 @@ class Finding(NamedTuple):
     text: str
 
 
-Baseline = Mapping[str, Sequence[Mapping[str, Any]]]
-"""Rows of an earlier record, by contestant."""
-
-
 def judge(results: Sequence[Result], gate: Gate, baseline: Baseline | None) -> list[Finding]:
     """Every condition of ``gate`` on results without faults."""
     findings = []
@@ -75,9 +78,24 @@ def judge(results: Sequence[Result], gate: Gate, baseline: Baseline | None) -> l
 
 
 def _floor(name: str, own: Sequence[Result], metric: str, least: float) -> Finding:
-    worst = min(result.metrics.get(metric, float("-inf")) for result in own)
+    """A lost cell is below every floor; of one that has nothing to say nobody knows."""
+    values = [result.metrics.get(metric, math.nan) for result in own]
+    known = [
+        -math.inf if math.isnan(value) and _is_lost(result) else value
+        for value, result in zip(values, own, strict=True)
+    ]
+    silent = sum(map(math.isnan, known))
+    worst = min((value for value in known if not math.isnan(value)), default=math.nan)
     text = f"{name}: {metric} is {worst:g} at worst, {least:g} at least is asked"
-    return Finding(Outcome.PASS if worst >= least else Outcome.REGRESSION, text)
+    if worst < least:
+        return Finding(Outcome.REGRESSION, text)
+    if silent:
+        return Finding(Outcome.CANNOT_TELL, f"{name}: {metric} has nothing to say in {silent} of {len(own)} cells")
+    return Finding(Outcome.PASS, text)
+
+
+def _is_lost(result: Result) -> bool:
+    return result.status not in ALIVE
 
 
 def _inside(name: str, own: Sequence[Result], metric: str) -> Finding:
@@ -91,61 +109,40 @@ def _inside(name: str, own: Sequence[Result], metric: str) -> Finding:
     return Finding(Outcome.REGRESSION if len(outside) else Outcome.PASS, text)
 
 
-def _against(name: str, own: Sequence[Result], gate: Gate, before: Sequence[Mapping[str, Any]] | None) -> list[Finding]:
+def _against(name: str, own: Sequence[Result], gate: Gate, before: Sequence[Row] | None) -> list[Finding]:
     if before is None:
         return [Finding(Outcome.CANNOT_TELL, f"{name}: the baseline does not know it")]
-    lost_before = {(row["run"], row["seed"]) for row in before if row["status"] not in ALIVE}
+    rows = counterparts(own, before)
+    if rows is None:
+        return [Finding(Outcome.CANNOT_TELL, f"{name}: the baseline has other runs or seeds")]
     findings = [
         Finding(Outcome.REGRESSION, f"{result.cell}: {result.status}, and was not before")
-        for result in own
-        if result.status not in ALIVE and (result.cell.run.id, result.cell.seed) not in lost_before
+        for result, row in zip(own, rows, strict=True)
+        if _is_lost(result) and row["status"] in ALIVE
     ]
     for metric, margin in gate.ratio.items():
-        findings.append(_ratio(name, metric, margin, score_matrix(own, metric), _matrix(before, metric)))
+        now = score_matrix(own, metric)
+        findings.append(_ratio(name, metric, margin, now, scores(rows, metric).reshape(now.shape)))
     return findings
 
 
-def _matrix(rows: Sequence[Mapping[str, Any]], metric: str) -> Floats:
-    runs = list(dict.fromkeys(row["run"] for row in rows))
-    table = [[row.get(metric) for row in rows if row["run"] == run] for run in runs]
-    return np.array([[np.inf if value is None else value for value in row] for row in table], dtype=np.float64)
-
-
 def _ratio(name: str, metric: str, margin: float, now: Floats, before: Floats) -> Finding:
-    """Regression when the whole interval of now over before is above 1 + margin, pass when all of it is below."""
-    if now.shape != before.shape:
-        return Finding(Outcome.CANNOT_TELL, f"{name}: {metric}: the baseline has other runs or seeds")
+    """Regression when the whole interval of now over before is above 1 + margin, or a run is lost that was not; pass
+    when all of it is below.
+    """
     if np.allclose(now, before, rtol=1e-12, atol=0.0):
         return Finding(Outcome.PASS, f"{name}: {metric} is what it was")
+    if not (np.minimum(now, before) > 0.0).all():
+        return Finding(Outcome.USAGE, f"{name}: {metric} is not above 0 everywhere, and has no ratio; ask for another")
     (verdict,) = compare({"now": now, "before": before}, metric).verdicts
     ratio, low, high = verdict.ratio
     text = f"{name}: {metric} now / before {ratio:.3f} [{low:.3f}, {high:.3f}], margin {1.0 + margin:g}"
+    if verdict.losses:
+        lost = f"is infinite or missing in {verdict.losses} of {verdict.runs} runs where it was not"
+        return Finding(Outcome.REGRESSION, f"{name}: {metric} {lost}")
     if low > 1.0 + margin:
         return Finding(Outcome.REGRESSION, text)
     return Finding(Outcome.PASS if high <= 1.0 + margin else Outcome.CANNOT_TELL, text)
-
-
-def read_baseline(path: Path) -> Baseline:
-    """What `fusion bench export --json`, or `report --html`, has written, by contestant; raises `SuiteError`."""
-    try:
-        text = path.read_text(encoding="utf-8")
-        stored = data_of(text) if path.suffix == ".html" else json.loads(text)
-        version, grouped = stored["metrics_version"], _by_estimator(stored["results"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise SuiteError(f"{path}: no baseline ({error}); write one with `fusion bench export --json`") from error
-    if version != METRICS_VERSION:
-        raise SuiteError(f"{path}: of metrics {version}, these are {METRICS_VERSION}; write the baseline anew")
-    return grouped
-
-
-def _by_estimator(rows: Sequence[Mapping[str, Any]]) -> Baseline:
-    """The rows without faults; raises what rows raise that are none."""
-    grouped: dict[str, list[Mapping[str, Any]]] = {}
-    for row in rows:
-        estimator, fault, *_ = (row[key] for key in ("estimator", "fault", "run", "seed", "status"))
-        if fault == CLEAN:
-            grouped.setdefault(estimator, []).append(row)
-    return grouped
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -180,10 +177,15 @@ def _findings(arguments: argparse.Namespace) -> list[Finding]:
     named = arguments.baseline or (suite.folder / suite.gate.baseline if suite.gate.baseline else None)
     for metric in {*suite.gate.ratio, *suite.gate.floor, *suite.gate.inside}:
         require_metric(metric, results)
+    for metric in filter(MORE_IS_BETTER.fullmatch, suite.gate.ratio):
+        raise SuiteError(f"gate.ratio.{metric}: more of it is better, so it may grow as it likes; give it a floor")
     found = judge(results, suite.gate, read_baseline(named) if named else None)
+    if suite.gate.ratio and named is None:
+        asked = ", ".join(suite.gate.ratio)
+        found.append(Finding(Outcome.NOT_MEASURED, f"gate.ratio ({asked}) compares with a baseline; give --baseline"))
     found += [
         Finding(Outcome.NOT_DETERMINISTIC, f"{cell}: computed again, it differs")
-        for cell in differing(cells, store, arguments.verify)
+        for cell in differing(cells, store, arguments.verify, Limits(suite.limits.wall_s, suite.limits.rss_mb))
     ]
     if suite.gate.inconclusive == "warn":
         found = [one._replace(outcome=Outcome.PASS) if one.outcome is Outcome.CANNOT_TELL else one for one in found]

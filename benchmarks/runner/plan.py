@@ -16,7 +16,7 @@ from benchmarks.faults.fault_kind import Fault
 from benchmarks.faults.faults import read_fault
 from benchmarks.metrics.archive import ARCHIVE_VERSION
 from benchmarks.metrics.score import METRICS_VERSION
-from benchmarks.runner.definition import CLEAN, Contestant, Evaluation, FaultSet, RunSource, Suite
+from benchmarks.runner.definition import CLEAN, CellLimits, Contestant, Evaluation, FaultSet, RunSource, Suite
 from benchmarks.runner.source import Content, content_of, fingerprint
 from benchmarks.runner.store import Store, key_of
 from fusion import SuiteError
@@ -33,6 +33,7 @@ class Cell(NamedTuple):
     seed: int
     suite_seed: int
     evaluation: Evaluation
+    limits: CellLimits
     folder: Path
     content: Content
     estimate_key: str
@@ -55,7 +56,7 @@ def cells_of(suite: Suite, store: Store) -> list[Cell]:
         for fault, contestant, seed in product(suite.faults, suite.contestants, range(suite.seeds)):
             spec = {**made[contestant.id], **run_spec(suite, run, fault, content), "seed": seed}
             key = key_of(spec)
-            drawn = (run, contestant, fault, seed, suite.seed, suite.evaluation, folder, content)
+            drawn = (run, contestant, fault, seed, suite.seed, suite.evaluation, suite.limits, folder, content)
             cells.append(Cell(*drawn, key, key_of({"estimate": key, **judged})))
     return cells
 
@@ -99,11 +100,19 @@ class Missing(NamedTuple):
 
 
 def missing(cells: Sequence[Cell], store: Store) -> Missing:
-    """The cells without an estimate, and those with one but without a score."""
-    estimates = [one for one in cells if not store.has("estimates", one.estimate_key)]
+    """The cells without an estimate that holds (`has_estimate`), and those with one but without a score."""
+    estimates = [one for one in cells if not has_estimate(one, store)]
     unmade = {one.estimate_key for one in estimates}
     scores = [one for one in cells if one.estimate_key not in unmade and not store.has("scores", one.score_key)]
     return Missing(estimates, scores)
+
+
+def has_estimate(cell: Cell, store: Store) -> bool:
+    """Whether its estimate is there, for good: one that broke a limit is worth nothing once the limit is greater."""
+    if not store.has("estimates", cell.estimate_key):
+        return False
+    broken = store.read_json("estimates", cell.estimate_key, "result.json").get("broken_limit")
+    return broken is None or getattr(cell.limits, broken["name"]) <= broken["value"]
 
 
 def shard(cells: Sequence[Cell], number: int, count: int) -> list[Cell]:

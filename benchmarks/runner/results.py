@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -21,6 +22,11 @@ from fusion import ParameterError
 from fusion.errors import did_you_mean
 
 RANKED_BY = "pos_p75"
+MORE_IS_BETTER = re.compile(
+    r"n|n_valid|.*n_eff|.*availability|cover.*|pos_auc|pos_cdf_.*|t_conv_share|nis95_.*|white_.*|rpe_.*_n"
+)
+NEITHER_IS_BETTER = re.compile(r"anees.*|nll_.*|.*bias.*|cov_.*|path_ratio|eag|.*growth")
+"""Their best is 1 or 0, or they may be negative and so have no ratio."""
 ALIVE = ("ok", "unscored")
 """Statuses of a cell that was not lost."""
 
@@ -56,6 +62,14 @@ def require_metric(metric: str, results: Sequence[Result]) -> None:
     known = {name for result in results for name in result.metrics}
     if known and metric not in known:
         raise ParameterError(f"the suite has no metric {metric!r}; {did_you_mean(metric, sorted(known))}")
+
+
+def require_lower_is_better(metric: str) -> None:
+    """Raises `ParameterError` for a metric of which more is better, or a certain value: that the lower wins would be
+    the wrong verdict.
+    """
+    if MORE_IS_BETTER.fullmatch(metric) or NEITHER_IS_BETTER.fullmatch(metric):
+        raise ParameterError(f"a lower {metric} is not better, so it decides nothing here; {RANKED_BY} is usual")
 
 
 def judged(results: Sequence[Result]) -> list[Result]:

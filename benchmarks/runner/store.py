@@ -13,6 +13,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,14 @@ class Store:
             _move(beside, place)
         except OSError as error:
             raise FusionError(f"{place}: cannot be written ({error.strerror}); give another --store") from error
+
+    def discard(self, kind: str, key: str) -> None:
+        """Take an entry away, in one step; one that is not there, or that another runner takes, is no matter."""
+        place = self.place(kind, key)
+        with suppress(OSError):
+            beside = Path(tempfile.mkdtemp(prefix=".", dir=place.parent))
+            os.replace(place, beside)
+            shutil.rmtree(beside, ignore_errors=True)
 
 
 def _move(beside: Path, place: Path) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import platform
+import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -18,23 +19,26 @@ from benchmarks.metrics.track import Floats
 from benchmarks.output import write_json
 from benchmarks.prior import starting_prior
 from benchmarks.runner.definition import Contestant, RunSource, Suite, load_suite
+from benchmarks.runner.execute import LOST
 from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.source import open_run
 from benchmarks.sheet import Sheet, print_sheets
 from benchmarks.worker_process import peak_rss_bytes
 from benchmarks.workers import Limits, Loss, compute
+from fusion import FusionError
 from fusion.values import seconds
 from logs.run import Run
 
 REPEATS = 5
 TIMING_FILE = "timing.json"
+TimingTask: TypeAlias = tuple[RunSource, Path, Contestant, int]
+"""A run, the folder of its suite, a contestant, and how many repeats."""
 
 
 class Timing(NamedTuple):
     """What one contestant costs: processor time per measurement [µs], the least of all repeats and their quartiles;
     quantiles of the time one measurement takes [µs], in the best repeat; how many seconds of processor time a second
-    of the log takes; and the peak memory [MB] of a fresh process that opens the run and filters it once, None if it
-    does not survive.
+    of the log takes; and the peak memory [MB] of a fresh process that opens the run and filters it once.
     """
 
     contestant: str
@@ -46,25 +50,52 @@ class Timing(NamedTuple):
     upd_p99_us: float
     upd_max_us: float
     rtf: float
-    rss_mb: float | None
+    rss_mb: float
 
 
-def measure(suite: Suite, repeats: int = REPEATS) -> Iterator[Timing]:
-    """Every contestant on the suite's first run, after one run to warm up; those that fail are left out."""
-    run = open_run(suite.runs[0], suite.folder)
+class Untimed(NamedTuple):
+    """A contestant that has no time, and why."""
+
+    contestant: str
+    why: str
+
+
+def measure(suite: Suite, repeats: int = REPEATS) -> Iterator[Timing | Untimed]:
+    """Every contestant on the suite's first run, after one run to warm up, in a process of its own within the suite's
+    limits: one that fails, hangs or dies costs its own time alone.
+    """
+    tasks = [(suite.runs[0], suite.folder, contestant, repeats) for contestant in suite.contestants]
+    limits = Limits(suite.limits.wall_s * (repeats + 1), suite.limits.rss_mb)
+    for task in tasks:
+        ((_, found),) = compute(_time, _untimed, [task], 1, limits)
+        yield found
+
+
+def _untimed(task: TimingTask, loss: Loss) -> Timing | Untimed:
+    return Untimed(task[2].id, LOST[loss])
+
+
+def _time(task: TimingTask) -> Timing | Untimed:
+    source, folder, contestant, repeats = task
+    run = open_run(source, folder)
     stamps = [measurement.time_ns for measurement in run.measurements]
-    log_s = max(seconds(max(stamps) - min(stamps)), 1e-9)
-    for contestant in suite.contestants:
-        try:
-            folds = [_fold_us(run, contestant) for _ in range(repeats + 1)][1:]
-        except Exception:  # noqa: BLE001, S112 - a plug-in may fail in any way, and has no time then
-            continue
-        means = [float(fold.mean()) for fold in folds]
-        best = folds[int(np.argmin(means))]
-        low, high = np.quantile(means, (0.25, 0.75)).tolist()
-        p50, p95, p99, most = np.quantile(best, (0.50, 0.95, 0.99, 1.0)).tolist()
-        rtf, rss_mb = 1e-6 * float(best.sum()) / log_s, peak_mb(suite.runs[0], suite.folder, contestant)
-        yield Timing(contestant.id, min(means), low, high, p50, p95, p99, most, rtf, rss_mb)
+    if not stamps:
+        return Untimed(contestant.id, f"{source.id} holds no measurement")
+    try:
+        _fold_us(run, contestant)
+        rss_mb = peak_rss_bytes() / 2**20
+        folds = [_fold_us(run, contestant) for _ in range(repeats)]
+    except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way, and has no time then
+        return Untimed(contestant.id, str(error) if isinstance(error, FusionError) else repr(error))
+    return _timing(contestant.id, folds, max(seconds(max(stamps) - min(stamps)), 1e-9), rss_mb)
+
+
+def _timing(name: str, folds: Sequence[Floats], log_s: float, rss_mb: float) -> Timing:
+    means = [float(fold.mean()) for fold in folds]
+    best = folds[int(np.argmin(means))]
+    low, high = np.quantile(means, (0.25, 0.75)).tolist()
+    p50, p95, p99, most = np.quantile(best, (0.50, 0.95, 0.99, 1.0)).tolist()
+    return Timing(name, min(means), low, high, p50, p95, p99, most, 1e-6 * float(best.sum()) / log_s, rss_mb)
 
 
 def _fold_us(run: Run, contestant: Contestant) -> Floats:
@@ -76,22 +107,6 @@ def _fold_us(run: Run, contestant: Contestant) -> Floats:
         tracker.push(measurement)
         clock.append(time.process_time_ns())
     return np.diff(np.array(clock)) / 1e3
-
-
-def peak_mb(source: RunSource, folder: Path, contestant: Contestant) -> float | None:
-    """Peak memory [MB] of a process of its own, from its start to the end of the run."""
-    ((_, found),) = compute(_fold_alone, _no_peak, [(source, folder, contestant)], 1, Limits())
-    return found
-
-
-def _fold_alone(task: tuple[RunSource, Path, Contestant]) -> float | None:
-    source, folder, contestant = task
-    _fold_us(open_run(source, folder), contestant)
-    return peak_rss_bytes() / 2**20
-
-
-def _no_peak(_task: tuple[RunSource, Path, Contestant], _loss: Loss) -> None:
-    return None
 
 
 def machine() -> dict[str, str]:
@@ -120,20 +135,27 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, keep beside the store, print."""
-    timings = sorted(measure(load_suite(arguments.suite), arguments.repeats), key=lambda timing: timing.least_us)
-    write_json(
-        arguments.store / TIMING_FILE, {"machine": machine(), "timings": [timing._asdict() for timing in timings]}
-    )
-    rows = tuple(_row(timing) for timing in timings)
+    """Measure, keep beside the store, print. Exit code 1 when no contestant has a time."""
+    found = list(measure(load_suite(arguments.suite), arguments.repeats))
+    timings = sorted((one for one in found if isinstance(one, Timing)), key=lambda timing: timing.least_us)
+    untimed = [one for one in found if isinstance(one, Untimed)]
+    rows = {"timings": [one._asdict() for one in timings], "untimed": [one._asdict() for one in untimed]}
+    write_json(arguments.store / TIMING_FILE, {"machine": machine(), **rows})
+    for one in untimed:
+        sys.stderr.write(f"fusion bench time: {one.contestant} has no time: {one.why}\n")
     head = ("µs per measurement", "least", "q25", "q75", "p50", "p95", "p99", "max", "CPU s per log s", "peak MB")
     print_sheets(
-        [Sheet("Alone on this machine: processor time, means over repeats and single measurements; memory", head, rows)]
+        [
+            Sheet(
+                "Alone on this machine: processor time, means over repeats and single measurements; memory",
+                head,
+                tuple(map(_row, timings)),
+            )
+        ]
     )
-    return 0
+    return 0 if timings else 1
 
 
 def _row(timing: Timing) -> tuple[str, ...]:
     name, *times_us, rtf, rss_mb = timing
-    memory = "–" if rss_mb is None else f"{rss_mb:.0f}"
-    return (str(name), *(f"{value:.1f}" for value in times_us), f"{rtf:.4f}", memory)
+    return (str(name), *(f"{value:.1f}" for value in times_us), f"{rtf:.4f}", f"{rss_mb:.0f}")

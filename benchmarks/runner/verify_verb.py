@@ -10,26 +10,39 @@ from pathlib import Path
 
 from benchmarks.arguments import at_least_one
 from benchmarks.runner.definition import load_suite
-from benchmarks.runner.execute import carry_out
+from benchmarks.runner.execute import execute
 from benchmarks.runner.plan import Cell, cells_of
 from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.store import Store
+from benchmarks.workers import Limits, Loss
 
 NOT_DETERMINISTIC, NOT_MEASURED = 5, 3
 """Exit codes."""
 
 
-def differing(cells: Sequence[Cell], store: Store, count: int) -> list[Cell]:
-    """The cells, of ``count`` evenly spread over the keys of those that are there, that come out differently now."""
-    there = sorted((cell for cell in cells if store.has("scores", cell.score_key)), key=lambda cell: cell.estimate_key)
+def differing(cells: Sequence[Cell], store: Store, count: int, limits: Limits) -> list[Cell]:
+    """The cells, of ``count`` evenly spread over the keys of those that are there, that come out differently now.
+
+    Each within ``limits`` in a process of its own, for some hang or die. Those that broke a limit are left out: how
+    far they come depends on the machine.
+    """
+    there = sorted((cell for cell in cells if _is_pure(cell, store)), key=lambda cell: cell.estimate_key)
     sample = there[:: max(len(there) // count, 1)][:count] if count else []
     with tempfile.TemporaryDirectory(prefix="fusion-verify-") as folder:
         again = Store(Path(folder))
-        return [cell for cell in sample if not _same(cell, store, again)]
+        done = [one.cell for one in execute(sample, again, workers=1, limits=limits)]
+        return [cell for cell in done if not _same(cell, store, again)]
+
+
+def _is_pure(cell: Cell, store: Store) -> bool:
+    """Whether the cell is there, and ended by itself."""
+    if not store.has("scores", cell.score_key):
+        return False
+    made = store.read_json("estimates", cell.estimate_key, "result.json")
+    return made["ended"] not in (Loss.TIMEOUT.value, Loss.OUT_OF_MEMORY.value)
 
 
 def _same(cell: Cell, store: Store, again: Store) -> bool:
-    carry_out((cell, again.folder))
     return all(
         store.read(kind, key, name) == again.read(kind, key, name)
         for kind, key, name in (
@@ -50,10 +63,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Name the cells that differ. Exit code 5 when some do, 3 when none is there to compare."""
     suite, store = load_suite(arguments.suite), Store(arguments.store)
     cells = cells_of(suite, store)
-    if not any(store.has("scores", cell.score_key) for cell in cells):
-        sys.stderr.write("fusion bench verify: no cell is there; run the suite first\n")
+    if not any(_is_pure(cell, store) for cell in cells):
+        sys.stderr.write("fusion bench verify: no cell is there that ended by itself; run the suite first\n")
         return NOT_MEASURED
-    wrong = differing(cells, store, arguments.sample)
+    wrong = differing(cells, store, arguments.sample, Limits(suite.limits.wall_s, suite.limits.rss_mb))
     for cell in wrong:
         sys.stdout.write(f"{cell}: computed again, it differs\n")
     if not wrong:

@@ -79,3 +79,12 @@ def test_weighted_quantile_stays_between_its_neighbours_and_meets_infinity():
     assert found[0] == 1.0
     assert 2.0 < found[1] < 3.0
     assert found[2:] == [np.inf, np.inf]
+
+
+def test_one_answer_alone_stands_for_no_time_and_is_left_out():
+    truth = truth_of(np.arange(0.0, 3.0, 0.1), np.zeros(30))
+    met = meet(truth, track_of([1.0, 9.0], [5.0, 6.0]))
+    assert met.availability == 0.0
+    scores = metrics(errors(met.instants, met.answers, met.weight))
+    assert scores["n"] == 0.0
+    assert all(np.isnan(scores[name]) for name in ("pos_mean", "pos_rmse", "pos_p75", "pos_cdf_1m", "bias_x"))

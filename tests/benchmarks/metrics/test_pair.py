@@ -141,3 +141,17 @@ def test_place_that_cannot_be_written_is_named(oracle_d, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(FusionError, match="cannot be written"):
         command("--truth", truth, "--estimate", estimate, "--json", tmp_path / "file" / "out.json")
+
+
+@pytest.mark.parametrize(
+    ("truth_s", "said_s", "message"),
+    [
+        (np.arange(0.0, 60.0, 5.0), np.arange(1.0, 50.0, 5.0), "sparser everywhere; use --mode causal"),
+        (np.arange(0.0, 60.0, 0.1), np.array([30.0, 99.0]), "fewer than two poses lie within the truth"),
+    ],
+)
+def test_what_cannot_be_interpolated_says_why(tmp_path, write_tum, truth_s, said_s, message):
+    for name, stamps in (("truth", truth_s), ("mine", said_s)):
+        write_tum(tmp_path / f"{name}.tum", stamps, stamps, 0.0 * stamps, 0.0 * stamps)
+    with pytest.raises(LogError, match=message):
+        score_pair(tmp_path / "truth.tum", tmp_path / "mine.tum", mode="interp")

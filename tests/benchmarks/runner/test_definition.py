@@ -60,6 +60,13 @@ def test_grid_is_spread_into_contestants_with_their_own_ids(tmp_path):
             r"runs\[1\] \(b\).duration_s: -1 is not above 0",
         ),
         ('[[estimators]]\nid = "pf"\nuse = "particle"\ngrid = { particles = [] }', "pf: grid.particles is empty"),
+        ('[[runs]]\nid = "b"\nscenario = "office"\nseed = -3', r"runs\[1\] \(b\).seed: -3 is below 0"),
+        ('[[runs]]\nid = "b"\nmcap = "b.mcap"\nduration_s = 5.0', "a log is taken whole"),
+        ('[[runs]]\nid = "b"\nmcap = "b.mcap"\nseed = 1', "a log is taken whole"),
+        ('[[runs]]\nid = "b"\nmcap = "b.mcap"\ntruth_to_map = [1.0, 0.0, 0.0]', "truth_to_map is of a foreign bag"),
+        ('[[runs]]\nid = ""\nscenario = "office"', r"runs\[1\]: the id is empty"),
+        ('[[estimators]]\nid = "e"\nuse = "ekf"\nparams = { gate_probability = nan }', "gate_probability is nan"),
+        ('[[estimators]]\nid = "e"\nuse = "ekf"\ngrid = { gate_probability = [0.9, inf] }', "gate_probability is inf"),
         ("x = [", "not TOML"),
     ],
 )

@@ -2,8 +2,8 @@
 
 import csv
 import json
+import math
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
@@ -11,17 +11,19 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics.score import METRICS_VERSION
+from benchmarks.runner.baseline import read_baseline
 from benchmarks.runner.compare_verb import stored_results
 from benchmarks.runner.definition import Contestant, FaultSet, Gate, RunSource, load_suite
 from benchmarks.runner.export_verb import as_junit, as_latex
-from benchmarks.runner.gate_verb import Outcome, judge, read_baseline
+from benchmarks.runner.gate_verb import Outcome, judge
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import comparison, flat, score_matrix
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.time_verb import peak_mb
+from benchmarks.runner.time_verb import measure
 from benchmarks.runner.verify_verb import differing
 from benchmarks.sheet import Sheet
+from benchmarks.workers import Limits
 from fusion.cli import main
 
 HEAD = '[suite]\nname = "verbs"\n'
@@ -96,6 +98,10 @@ def test_compare_says_in_a_sentence_who_is_better_or_that_it_cannot_tell(place, 
         (["wheelz"], "did you mean 'wheels'"),
         (["--metric", "pos_p755"], "did you mean 'pos_p75'"),
         (["--fault", "claen"], "did you mean 'clean'"),
+        (["--metric", "availability"], "a lower availability is not better"),
+        (["--metric", "anees"], "a lower anees is not better"),
+        (["wheels"], "name two or more"),
+        (["wheels", "wheels"], "name two or more"),
     ],
 )
 def test_compare_refuses_what_the_suite_does_not_have(place, more, message, capsys):
@@ -148,6 +154,62 @@ def test_a_cell_that_is_lost_now_and_was_not_before_is_a_regression(results):
 def test_contestant_that_the_baseline_does_not_know_cannot_be_told(results):
     known = {"wheels": baseline_of(results)["wheels"]}
     assert Outcome.CANNOT_TELL in outcomes(judge(results, Gate(ratio={"pos_p75": 0.05}), known))
+
+
+def test_gate_pairs_with_its_baseline_by_run_not_by_row(results):
+    gate, before = Gate(ratio={"pos_p75": 0.05}), baseline_of(results)
+    backwards = {name: rows[::-1] for name, rows in before.items()}
+    assert outcomes(judge(results, gate, backwards)) == {Outcome.PASS}
+    elsewhere = {
+        name: [{**row, "run": f"{row['run']}-of-another-hall"} for row in rows] for name, rows in before.items()
+    }
+    assert outcomes(judge(results, gate, elsewhere)) == {Outcome.CANNOT_TELL}
+    shorter = [result for result in results if result.cell.run.id != "run3"]
+    assert outcomes(judge(shorter, gate, before)) == {Outcome.CANNOT_TELL}
+    tuned = {name: [*rows, {**rows[0], "run": "tuning", "split": "tune"}] for name, rows in before.items()}
+    assert outcomes(judge(results, gate, tuned)) == {Outcome.PASS}
+
+
+def test_run_whose_score_became_infinite_is_a_regression(results):
+    found = judge(scaled(results, "wheels", [1.0] * 7 + [np.inf]), Gate(ratio={"pos_p75": 0.05}), baseline_of(results))
+    assert [one.outcome for one in found] == [Outcome.REGRESSION, Outcome.PASS]
+    assert "1 of 8 runs" in found[0].text
+
+
+def test_scores_of_zero_have_no_ratio(results):
+    found = judge(scaled(results, "wheels", [0.0] * 8), Gate(ratio={"pos_p75": 0.05}), baseline_of(results))
+    assert [one.outcome for one in found] == [Outcome.USAGE, Outcome.PASS]
+
+
+@pytest.mark.parametrize("silent", [0, -1])
+def test_cell_that_says_nothing_hides_behind_no_other(results, silent):
+    spoilt = list(results)
+    spoilt[silent] = results[silent]._replace(metrics={**results[silent].metrics, "availability": math.nan})
+    assert Outcome.CANNOT_TELL in outcomes(judge(spoilt, Gate(floor={"availability": 0.9}), None))
+    spoilt[silent] = spoilt[silent]._replace(status="crashed")
+    assert Outcome.REGRESSION in outcomes(judge(spoilt, Gate(floor={"availability": 0.9}), None))
+
+
+def test_gate_that_asks_for_a_ratio_does_not_pass_without_a_baseline(place, capsys):
+    assert main(words(place, "gate")) == Outcome.NOT_MEASURED
+    assert "give --baseline" in capsys.readouterr().out
+
+
+def test_gate_limits_the_growth_of_nothing_that_should_grow(place, tmp_path, capsys):
+    text = (place / "suite.toml").read_text(encoding="utf-8").replace("pos_p75 = 0.05", "availability = 0.05")
+    (tmp_path / "suite.toml").write_text(text, encoding="utf-8")
+    assert main(["bench", "gate", str(tmp_path / "suite.toml"), "--store", str(place / "store")]) == Outcome.USAGE
+    assert "give it a floor" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("spoil", [{"pos_p75": "high"}, {"pos_p75": math.nan}, {"pos_p75": True}, "twice"])
+def test_rows_of_a_baseline_that_make_no_sense_are_told(place, results, spoil, tmp_path, capsys):
+    rows = [flat(result) for result in results]
+    rows = [*rows, rows[0]] if spoil == "twice" else [{**rows[0], **spoil}, *rows[1:]]
+    path = tmp_path / "base.json"
+    path.write_text(json.dumps({"metrics_version": METRICS_VERSION, "results": rows}), encoding="utf-8")
+    assert main(words(place, "gate", "--baseline", str(path))) == Outcome.USAGE
+    assert "baseline" in capsys.readouterr().out
 
 
 def test_gate_answers_with_the_exit_code_of_its_gravest_finding(place, tmp_path, capsys):
@@ -219,10 +281,10 @@ def test_verify_finds_the_cell_that_was_tampered_with(place, tmp_path, capsys):
     assert main(["bench", "verify", str(place / "suite.toml"), "--store", str(store.folder)]) == 3
     run_suite(cut, store, workers=1)
     cells = cells_of(cut, store)
-    assert differing(cells, store, 10) == []
+    assert differing(cells, store, 10, Limits()) == []
     track = store.place("estimates", cells[1].estimate_key) / "track.npz"
     track.write_bytes((store.place("estimates", cells[0].estimate_key) / "track.npz").read_bytes())
-    assert [str(cell) for cell in differing(cells, store, 10)] == [str(cells[1])]
+    assert [str(cell) for cell in differing(cells, store, 10, Limits())] == [str(cells[1])]
     assert main(["bench", "verify", str(place / "suite.toml"), "--store", str(store.folder)]) == 5
     assert "it differs" in capsys.readouterr().out
 
@@ -248,13 +310,17 @@ def test_verbs_refuse_a_suite_that_is_not_done(place, tmp_path, capsys):
         assert "0 of 16 cells are there; run `fusion bench run` first" in capsys.readouterr().err
 
 
-def test_peak_memory_is_that_of_the_estimator_in_a_process_of_its_own():
+def test_peak_memory_is_that_of_the_estimator_in_a_process_of_its_own(tmp_path):
     """300 000 particles are three columns of 2.4 MB at the least; what this process holds is not counted."""
     held = np.ones(50_000_000)
-    few, many = (
-        peak_mb(RunSource("office", scenario="office", duration_s=1.0), Path(), Contestant("pf", "particle", params))
-        for params in ({"particles": 10}, {"particles": 300_000})
+    path = tmp_path / "suite.toml"
+    particles = [
+        f'[[estimators]]\nid = "{n}"\nuse = "particle"\nparams = {{ particles = {n} }}\n' for n in (10, 300_000)
+    ]
+    path.write_text(
+        '[suite]\nname = "t"\n[[runs]]\nid = "a"\nscenario = "office"\nduration_s = 1.0\n' + "".join(particles)
     )
+    few, many = (timing.rss_mb for timing in measure(load_suite(path), repeats=1))
     assert 10.0 < few < held.nbytes / 2**20
     assert many > few + 3 * 2.4e6 / 2**20
 
