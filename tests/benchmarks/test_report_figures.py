@@ -4,6 +4,7 @@ cell, tried in a real browser.
 
 import html
 import json
+import math
 import re
 from io import BytesIO
 
@@ -231,11 +232,13 @@ def test_click_on_any_point_shows_its_cell_and_the_command_for_its_moment(materi
 
 
 def near_to(clicked, targets):
-    """Anchors and times of what lies within two pixels of a click: that of a program hits whole pixels only."""
+    """Anchors and times of what may be nearest to a click: a program's hits whole pixels only, up to the square root of
+    two beside what it aims at, and something else may lie no farther on the other side.
+    """
     width, height = clicked["size"]
     return {
         (anchor, times[0][k] if times else None)
         for anchor, _, xs, ys, *times in targets
         for k in range(len(xs))
-        if np.hypot(width * (xs[k] - clicked["x"]), height * (ys[k] - clicked["y"])) < 2.0 * 1e4
+        if np.hypot(width * (xs[k] - clicked["x"]), height * (ys[k] - clicked["y"])) <= 2.0 * math.sqrt(2.0) * 1e4
     }
