@@ -93,13 +93,7 @@ class Robot:
         return 2.0 / (1.0 + self.diameter_ratio), 2.0 * self.diameter_ratio / (1.0 + self.diameter_ratio)
 
 
-POSITIVE_RADIO = (
-    "frequency_hz",
-    "path_loss_exponent",
-    "reference_distance_m",
-    "shadowing_std_db",
-    "shadowing_length_m",
-)
+POSITIVE_RADIO = "frequency_hz", "path_loss_exponent", "reference_distance_m", "shadowing_std_db", "shadowing_length_m"
 
 
 @dataclass(frozen=True, slots=True)

@@ -108,12 +108,12 @@ def match(instants: Instants, track: Track, *, max_age_s: float = MAX_AGE_S) -> 
 
 def _newest(instants: Instants, stamp_ns: Whole, received_ns: Whole) -> tuple[Whole, Flags]:
     """Index of the newest stamp received by each instant, and whether any was; no index at all without stamps."""
-    due_ns = np.maximum(received_ns, stamp_ns)
-    in_order = (stamp_ns[1:] >= stamp_ns[:-1]).all()
-    by_due = np.arange(len(due_ns)) if in_order else np.argsort(due_ns, kind="stable")
-    due = np.searchsorted(due_ns if in_order else due_ns[by_due], instants.time_ns, side="right") - 1
+    due_ns, newest = np.maximum(received_ns, stamp_ns), np.arange(len(stamp_ns))
+    if not (stamp_ns[1:] >= stamp_ns[:-1]).all():
+        by_due = np.argsort(due_ns, kind="stable")
+        due_ns, newest = due_ns[by_due], by_due[_record(stamp_ns[by_due])]
+    due = np.searchsorted(due_ns, instants.time_ns, side="right") - 1
     heard = due >= 0
-    newest = by_due if in_order else by_due[_record(stamp_ns[by_due])]
     return newest.take(np.maximum(due, 0)) if len(newest) else newest, heard
 
 
