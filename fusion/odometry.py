@@ -128,6 +128,14 @@ def _twisted(state: OdometerState, own: Odometry, turn_rad: float) -> OdometerSt
     )
 
 
+def _forward(before: tuple[int, ...] | None, speeds_m_s: Sequence[float]) -> tuple[int, ...]:
+    """1 for each wheel that turns forwards, -1 backwards; one that is to stand rolls out the way it turned before."""
+    known = before or (1,) * len(speeds_m_s)
+    return tuple(
+        then if speed == 0.0 else 1 if speed > 0.0 else -1 for then, speed in zip(known, speeds_m_s, strict=True)
+    )
+
+
 class Odometer:
     """Turns one robot's motion measurements into `Odometry`. Holds the robot only; the state is a value."""
 
@@ -150,8 +158,7 @@ class Odometer:
             return self._ticks(state, measurement)
         if isinstance(measurement, MotorCommand):
             self._require_wheels(len(measurement.wheel_speeds_m_s), measurement)
-            forward = tuple(-1 if speed < 0.0 else 1 for speed in measurement.wheel_speeds_m_s)
-            return state._replace(forward=forward), ()
+            return state._replace(forward=_forward(state.forward, measurement.wheel_speeds_m_s)), ()
         if isinstance(measurement, Gyro):
             return self._gyro(state, measurement)
         state, motion = self.hold(state, measurement.time_ns)

@@ -228,6 +228,17 @@ def test_single_channel_encoders_take_their_sign_from_the_command():
     assert motion.turn_rad == pytest.approx(2 * 2 * 0.0102 / 0.15)
 
 
+def test_a_wheel_that_rolls_out_after_a_command_to_stand_goes_on_in_its_direction():
+    """Left backwards, right forwards; then both are to stand, and each still gives two ticks."""
+    odometer = Odometer(Robot(drive="differential", encoder="single_channel"))
+    state, _ = odometer.advance(odometer.start(0), MotorCommand(1, "m", 0, (-0.1, 0.1)))
+    state, _ = odometer.advance(state, WheelTicks(2, "e", 0, (9, 9)))
+    state, _ = odometer.advance(state, MotorCommand(3, "m", 1, (0.0, -0.0)))
+    _, (motion,) = odometer.advance(state, WheelTicks(SECOND, "e", 1, (11, 11)))
+    assert motion.distance_m == pytest.approx(0.0)
+    assert motion.turn_rad == pytest.approx(2 * 2 * 0.0102 / 0.15)
+
+
 def test_wheels_of_two_sizes_are_told_apart_and_their_mean_is_kept():
     """Borenstein & Feng: with the right wheel 2 % larger, equal counts are a left turn over the same distance."""
     distance, turn = wheel_increment(Robot(drive="differential", track_width_m=0.5, diameter_ratio=1.02), (1.0, 1.0))
