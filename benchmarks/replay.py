@@ -11,6 +11,7 @@ from pathlib import Path
 
 import fusion
 from benchmarks.arguments import not_negative
+from benchmarks.cell import cached_run
 from benchmarks.lane import Lane, run_lane
 from benchmarks.metrics.track import Track
 from fusion import LogError, ParameterError, PluginError, Truth
@@ -37,7 +38,7 @@ def replay(
     """
     if output is not None and output.resolve() == run.resolve():
         raise LogError(f"{output}: this is the log being replayed; give the output another name")
-    recorded = read_run(run)
+    recorded = cached_run(run)
     fusion.build(estimator, recorded.world, options)
     lane = run_lane(recorded, estimator, options, seed)
     if lane.error is not None:
@@ -122,5 +123,7 @@ def run(arguments: argparse.Namespace) -> int:
         seed=arguments.seed,
         verify=arguments.verify,
     )
+    for warning in cached_run(arguments.run).warnings:
+        sys.stderr.write(f"fusion replay: {warning}\n")
     sys.stdout.write(f"{digest}\n")
     return 0

@@ -64,5 +64,14 @@ def as_markdown(sheet: Sheet) -> str:
     return f"**{sheet.title}**\n\n" + "\n".join(lines)
 
 
+def as_code(text: str) -> str:
+    """``text`` as it stands, in Markdown: what a plug-in or a log says is none.
+
+    >>> as_code("no `x`; *none* at all")
+    "`no 'x'; *none* at all`"
+    """
+    return "`" + text.replace("`", "'") + "`"
+
+
 def _row(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cell.replace("<", "&lt;").replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"

@@ -68,6 +68,10 @@ class Advice(NamedTuple):
     what: str
     cure: str = ""
 
+    def __str__(self) -> str:
+        """One sentence, as that of an error."""
+        return f"{self.what}; {self.cure}" if self.cure else self.what
+
 
 @unique
 class Level(Enum):

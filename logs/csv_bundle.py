@@ -21,6 +21,7 @@ from fusion import (
     World,
 )
 from logs.recording import Recording, Row, prior_from_truth, read_table
+from logs.wheel_direction import caution_of_run
 
 
 def recordings(folder: Path) -> Iterator[Recording]:
@@ -34,7 +35,9 @@ def recordings(folder: Path) -> Iterator[Recording]:
         raise RecordingError(f"{folder}: none of odometry.csv, ticks.csv, ranges.csv, rssi.csv has a row; add one")
     truths = _truth(folder)
     prior, how = prior_from_truth(odometry, truths)
-    yield Recording(folder.resolve().name, world, prior, measurements, truths, {"source": "csv", "prior": how})
+    found, about = caution_of_run(world.robot, measurements, ()), {"source": "csv", "prior": how}
+    doubts = [f"{folder}: {found}"] if found else []
+    yield Recording(folder.resolve().name, world, prior, measurements, truths, about, warnings=doubts)
 
 
 def _rows(folder: Path, name: str, *required: str) -> list[Row]:

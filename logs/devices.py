@@ -15,6 +15,8 @@ from logs.device_messages import ClockSync
 STEP_NS = nanoseconds(0.05)
 """Least step of the wall clock against the time since boot that is told; NTP slews by less than this in ten seconds."""
 MOST_TOLD = 10
+STATE, RUNNING = "state", "running"
+"""What remarks on a sensor by its recorder hold, and its value while all is well."""
 OPENED = "opened"
 """The text of the remark by which a recorder tells what a device says of itself."""
 STATUS = "status"
@@ -57,6 +59,11 @@ def complaints(remarks: Sequence[Remark]) -> list[tuple[str, int]]:
 def as_line(remark: Remark) -> str:
     """A remark with the name of its sensor, which errors of drivers say by themselves."""
     return remark.text if remark.text.startswith(remark.sensor) else f"{remark.sensor}: {remark.text}"
+
+
+def is_down(remark: Remark) -> bool:
+    """Whether a recorder remarks that the sensor does not run: it is lost, or not there yet."""
+    return dict(remark.values).get(STATE, RUNNING) != RUNNING
 
 
 def dropped(remarks: Sequence[Remark]) -> dict[str, int]:

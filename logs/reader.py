@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +17,7 @@ from logs.device_messages import ClockSync
 from logs.messages import DECODERS, ESTIMATE_TOPIC, FATES_TOPIC
 from logs.run import Run, TruthTrack
 from logs.walk import Walk
+from logs.wheel_direction import caution_of_run
 from logs.writer import RUN_RECORD
 
 
@@ -65,7 +66,7 @@ def read_log(path: Path) -> Log:
         metadata={key: value for key, value in contents.record.items() if key != "world"},
         measurements=tuple(item[1] for item in sorted(contents.measurements, key=lambda item: item[0])),
         truth=TruthTrack.from_truths(contents.truths) if contents.truths else None,
-        warnings=(*walk.warnings, *_warnings(path, contents, world)),
+        warnings=(*walk.warnings, *_warnings(path, contents, world), *_cautions(path, contents, world)),
         lanes={name: tuple(estimates) for name, estimates in contents.lanes.items()},
         remarks=tuple(contents.remarks),
         clocks=tuple(contents.clocks),
@@ -138,3 +139,12 @@ def _warnings(path: Path, contents: _Contents, world: World) -> tuple[str, ...]:
     if not contents.measurements:
         found.append(f"{path}: holds no measurements")
     return tuple(found)
+
+
+def _cautions(path: Path, contents: _Contents, world: World) -> Iterator[str]:
+    """What makes the run misleading though all of it can be read."""
+    measurements = [measurement for _, measurement in contents.measurements]
+    if found := caution_of_run(world.robot, measurements, contents.remarks):
+        # A later part of a recording begins with a command that stands in an earlier one.
+        is_part = contents.record.get("split", "0") != "0"
+        yield f"{path}: {found._replace(cure='join the parts of the recording (`fusion join`)') if is_part else found}"

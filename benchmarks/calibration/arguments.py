@@ -58,7 +58,7 @@ def calibrate(arguments: argparse.Namespace, find: Callable[[list[Run]], Finding
             require_place(place)
     runs = load_runs(arguments.runs, arguments.world)
     found = find(runs)
-    for remark in found.remarks:
+    for remark in (*(warning for run in runs for warning in run.warnings), *found.remarks):
         sys.stderr.write(f"fusion calibrate {found.name}: {remark}\n")
     about = provenance(runs, found.method, found.samples, found.residual_std)
     if arguments.json != Path("-"):

@@ -18,7 +18,7 @@ from benchmarks.report.material import Material
 from benchmarks.report.worst import command, worst_moments
 from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.results import ALIVE, Result, by_contestant, by_run, median_metrics, score_matrix
-from benchmarks.sheet import Sheet
+from benchmarks.sheet import Sheet, as_code
 from benchmarks.statistics.statistics import mean_interval
 from benchmarks.table import COLUMNS, Column, Unit, as_text
 
@@ -180,7 +180,7 @@ def lost(material: Material) -> Sheet:
 
 def _why(result: Result) -> str:
     if result.error:
-        return "`" + result.error.replace("`", "'") + "`"  # what a plug-in says is no Markdown
+        return as_code(result.error)
     available = result.metrics.get("availability", math.nan)
     if available < LEAST_AVAILABILITY:
         return f"only {100.0 * available:.0f} % of the instants had a valid answer"

@@ -28,9 +28,9 @@ from benchmarks.report.sensitivity import advice, curves, sensitivity, sweeps
 from benchmarks.runner.compare_verb import stored_results
 from benchmarks.runner.definition import CLEAN, TUNE
 from benchmarks.runner.plan_verb import suite_options
-from benchmarks.runner.results import RANKED_BY, judged, record, require_lower_is_better, require_metric
+from benchmarks.runner.results import RANKED_BY, judged, record, require_lower_is_better, require_metric, warnings
 from benchmarks.runner.store import Store
-from benchmarks.sheet import Sheet, as_markdown
+from benchmarks.sheet import Sheet, as_code, as_markdown
 from benchmarks.statistics.within_run import LEAST_INSTANTS, within_run
 
 WITHIN_RUN = ("pos_p75", 0.75)
@@ -63,7 +63,8 @@ def report(material: Material, *, limit: bool = False) -> str:
 
 
 def _about_runs(material: Material) -> Iterator[str]:
-    """Which runs do not count, and why."""
+    """What is wrong with runs, and which do not count, and why."""
+    yield from (f"**Warning**: {as_code(warning)}" for warning in warnings(material.results))
     if blind := sorted({result.cell.run.id for result in material.results if not result.cell.content.truth}):
         yield f"Without ground truth, and so without an error: {', '.join(blind)}."
     counting = {result.cell.run.id for result in judged(material.results)}

@@ -103,6 +103,7 @@ def keep(cell: Cell, store: Store, lane: Lane, run: Run | None, ended: str = "cr
         "error": lane.error,
         "digest": lane.digest,
         "measurements": 0 if run is None else len(run.measurements),
+        "warnings": [] if run is None else list(run.warnings),
         "start_ns": None if run is None else Frame.around(run).start_ns,
         "fates": lane.fates.counts,
         "nis_mean": lane.fates.nis_mean,

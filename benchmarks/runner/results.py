@@ -33,7 +33,8 @@ ALIVE = ("ok", "unscored")
 
 class Result(NamedTuple):
     """One cell's score: infinite and NaN metrics are what `benchmarks.metrics.score` says they are. ``worst_at_s``:
-    when its position error was greatest, since the start of the run; None where there is no error.
+    when its position error was greatest, since the start of the run; None where there is no error. ``warnings``: a
+    sentence for each thing that is wrong with its run.
     """
 
     cell: Cell
@@ -43,6 +44,7 @@ class Result(NamedTuple):
     metrics: Mapping[str, float]
     facts: Mapping[str, object]
     worst_at_s: float | None
+    warnings: tuple[str, ...] = ()
 
 
 def read_results(cells: Iterable[Cell], store: Store) -> list[Result]:
@@ -53,8 +55,13 @@ def read_results(cells: Iterable[Cell], store: Store) -> list[Result]:
             scored = store.read_json("scores", cell.score_key, "result.json")
             made = store.read_json("estimates", cell.estimate_key, "result.json")
             told = (scored["status"], made["error"], made["digest"], read_metrics(scored), made, scored["worst_at_s"])
-            found.append(Result(cell, *told))
+            found.append(Result(cell, *told, tuple(made.get("warnings", ()))))
     return found
+
+
+def warnings(results: Sequence[Result]) -> list[str]:
+    """What is wrong with the runs, a sentence each after the id of the run."""
+    return list(dict.fromkeys(f"{one.cell.run.id}: {warning}" for one in results for warning in one.warnings))
 
 
 def require_metric(metric: str, results: Sequence[Result]) -> None:

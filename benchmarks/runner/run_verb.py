@@ -15,7 +15,7 @@ from benchmarks.runner.execute import Done, execute
 from benchmarks.runner.plan import Cell, cells_of, missing, shard
 from benchmarks.runner.plan_verb import suite_options
 from benchmarks.runner.refusals import refuse_impossible
-from benchmarks.runner.results import ALIVE, Result, leaderboard, read_results
+from benchmarks.runner.results import ALIVE, Result, leaderboard, read_results, warnings
 from benchmarks.runner.store import Store
 from benchmarks.sheet import print_sheets
 from benchmarks.workers import Limits
@@ -95,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
     sys.stderr.write(
         f"fusion bench run: {', '.join(f'{count} {status}' for status, count in sorted(counted.items()))}\n"
     )
-    for reason in lost(results):
+    for reason in (*warnings(results), *lost(results)):
         sys.stderr.write(f"fusion bench run: {reason}\n")
     print_sheets([leaderboard(results)])
     return 0 if any(result.status in ALIVE for result in results) else 1
