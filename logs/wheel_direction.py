@@ -16,7 +16,7 @@ from fusion.values import seconds
 from fusion.world import DRIVES, Robot
 from logs.devices import is_down
 
-LEAST_M = 0.05
+LEAST_M = 0.1
 """Distance [m] that a wheel may roll before its direction is missed: sensors do not all begin at the same moment."""
 
 

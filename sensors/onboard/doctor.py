@@ -14,10 +14,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
-from fusion import Advice, BootClock, Driver, FusionError, LogError
+from fusion import Advice, BootClock, Driver, FusionError, LogError, Measurement, Truth
 from fusion.driver import Needs
+from logs.wheel_direction import caution
 from sensors.device_errors import INSTALL
 from sensors.onboard.computer import is_clock_synced
 from sensors.onboard.robot_file import RobotFile, Sensor, build_driver
@@ -35,7 +37,7 @@ SYNCS = 10
 def examine(robot: RobotFile, folder: Path) -> list[Advice]:
     """Everything that ``robot`` needs to be recorded into ``folder``."""
     sensors = [advice for sensor in robot.sensors for advice in _sensor(sensor)]
-    return [*_clock(), *_disk(folder, robot.policy.min_free_mb), *sensors]
+    return [*_clock(), *_disk(folder, robot.policy.min_free_mb), *sensors, *_direction(robot)]
 
 
 def _sensor(sensor: Sensor) -> Iterator[Advice]:
@@ -49,6 +51,16 @@ def _sensor(sensor: Sensor) -> Iterator[Advice]:
     yield from _needs(sensor.name, driver.spec.needs)
     yield from _devices(sensor, driver)
     yield from getattr(driver, "advise", list)()
+
+
+def _direction(robot: RobotFile) -> Iterator[Advice]:
+    """Whether the sensors that can be built show which way the wheels turn."""
+    clock, kinds = BootClock(), set[type[Measurement | Truth]]()
+    for sensor in robot.sensors:
+        with suppress(FusionError):
+            kinds.update(build_driver(sensor, clock).spec.kinds)
+    if found := caution(robot.world.robot, kinds):
+        yield found
 
 
 def _needs(name: str, needs: Needs) -> Iterator[Advice]:

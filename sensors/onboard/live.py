@@ -33,7 +33,8 @@ class Now(NamedTuple):
     ``estimate`` is None once the estimator ended; ``error`` says why. ``measurements`` is how many it had heard: fold
     as many of the recorded log and ask for the same time, and the answer is the same. ``fates`` counts what became of
     readings since the last `Now`, ``news`` tells what ended since then. ``statuses``: how the sensors do, the age of
-    the freshest measurement of each among it.
+    the freshest measurement of each among it. ``warning``: what may have led all estimates astray, "" where nothing is
+    known to.
     """
 
     time_ns: int
@@ -43,6 +44,7 @@ class Now(NamedTuple):
     fates: Mapping[Decision, int]
     statuses: Sequence[Status]
     news: Sequence[str]
+    warning: str = ""
 
 
 class Ended(NamedTuple):
@@ -173,7 +175,8 @@ class _Fold:
         estimate = lane.estimate(now_ns)
         fates, self._fates = self._fates, Counter()
         news, self._news = self._news, []
-        return Now(now_ns, estimate, lane.error, self._measurements, fates, self._sensing.statuses(), news)
+        statuses, warning = self._sensing.statuses(), self._sensing.warning
+        return Now(now_ns, estimate, lane.error, self._measurements, fates, statuses, news, warning)
 
     def close(self) -> None:
         """Certify what was said in the log."""
@@ -182,7 +185,7 @@ class _Fold:
 
     def ended(self, duration_s: float) -> Ended:
         """What came of it."""
-        troubles = [*self._troubles.values(), *filter(None, [self._sensing.trouble])]
+        troubles = [*self._troubles.values(), *filter(None, [self._sensing.trouble, self._sensing.warning])]
         paths = self._kept.paths if self._kept else ()
         statuses = tuple(self._sensing.statuses())
         return Ended(paths, statuses, duration_s, self._digests(), "; ".join(dict.fromkeys(troubles)))

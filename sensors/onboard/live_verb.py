@@ -76,7 +76,7 @@ def _told(poses: Generator[Now, None, Ended]) -> Ended:
         _write_line(record(now))
         for trouble in now.news:
             sys.stderr.write(f"\nfusion live: {trouble}\n")
-        teller.tell(now.statuses, describe(now))
+        teller.tell(now.statuses, describe(now), now.warning)
 
 
 def _ended(ended: Ended) -> dict[str, object]:
@@ -95,6 +95,7 @@ def record(now: Now) -> dict[str, object]:
         "time_ns": now.time_ns if now.estimate is None else now.estimate.time_ns,
         **_pose(now.estimate),
         "error": now.error or None,
+        "warning": now.warning or None,
         "measurements": now.measurements,
         "age_s": {s.name: None if s.age_s is None else round(s.age_s, 3) for s in now.statuses},
         "state": {s.name: s.state.value for s in now.statuses},

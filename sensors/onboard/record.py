@@ -30,7 +30,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Record; 0 when it was stopped, 1 when it ended by itself."""
     robot = _with_policy(RobotFile.load(arguments.robot), arguments)
-    stop = threading.Event()
+    stop, teller = threading.Event(), StatusTeller()
     with stopped_by_signals(stop):
         recorded = record(
             robot,
@@ -39,10 +39,12 @@ def run(arguments: argparse.Namespace) -> int:
             duration_s=arguments.duration,
             degraded=arguments.degraded,
             fail_fast=arguments.fail_fast,
-            tell=StatusTeller().tell,
+            tell=lambda statuses, warning: teller.tell(statuses, warning=warning),
         )
     sys.stderr.write("\n")
     sys.stdout.write(_json(recorded) if arguments.json else _text(recorded))
+    if recorded.warning:
+        sys.stderr.write(f"warning: {recorded.warning}\n")
     if recorded.trouble:
         sys.stderr.write(f"fusion record: {recorded.trouble}\n")
     return int(bool(recorded.trouble))
@@ -64,6 +66,7 @@ def _json(recorded: Recorded) -> str:
         "paths": [str(path) for path in recorded.paths],
         "duration_s": recorded.duration_s,
         "trouble": recorded.trouble,
+        "warning": recorded.warning,
         "sensors": [status.record for status in recorded.statuses],
     }
     return json.dumps(about, indent=2) + "\n"

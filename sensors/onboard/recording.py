@@ -26,12 +26,15 @@ Answers = Sequence[tuple[str, Update]]
 
 
 class Recorded(NamedTuple):
-    """What came of a recording. ``trouble`` is why it ended by itself, "" where it was stopped."""
+    """What came of a recording. ``trouble`` is why it ended by itself, "" where it was stopped; ``warning`` says what
+    makes it misleading all the same, "" where nothing is known to.
+    """
 
     paths: tuple[Path, ...]
     statuses: tuple[Status, ...]
     duration_s: float
     trouble: str
+    warning: str = ""
 
 
 def record(
@@ -43,9 +46,10 @@ def record(
     degraded: bool = False,
     fail_fast: bool = False,
     patience_s: float = PATIENCE_S,
-    tell: Callable[[Sequence[Status]], None] = lambda _: None,
+    tell: Callable[[Sequence[Status], str], None] = lambda _statuses, _warning: None,
 ) -> Recorded:
-    """Record until ``stop`` is set, the time is over, or it cannot go on; ``tell`` hears each second how sensors do.
+    """Record until ``stop`` is set, the time is over, or it cannot go on; ``tell`` is given each second how sensors do,
+    and the warning of `Recorded` as it stands then.
 
     Raises `ParameterError` for a duration that is none, `LogError` where nothing can be written, `DriverError` where a
     required sensor does not open (unless ``degraded``), all before anything is recorded.
@@ -60,11 +64,11 @@ def record(
             for turn in sensing.turns(stop, duration_s):
                 recorder.take(turn)
                 if turn.report is not None:
-                    tell(turn.report.statuses)
+                    tell(turn.report.statuses, sensing.warning)
                 if recorder.trouble:
                     sensing.end(recorder.trouble)
     duration_s = seconds(sensing.clock.now_ns() - sensing.began_ns)
-    return Recorded(recorder.paths, tuple(sensing.statuses()), duration_s, sensing.trouble)
+    return Recorded(recorder.paths, tuple(sensing.statuses()), duration_s, sensing.trouble, sensing.warning)
 
 
 def check_policy(policy: Policy, folder: Path) -> None:

@@ -12,8 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import NamedTuple
 
-from fusion import BootClock, DeviceInfo, NotFoundError, ParameterError
+from fusion import BootClock, DeviceInfo, NotFoundError, ParameterError, SettingError
 from fusion.values import nanoseconds, seconds
+from logs.wheel_direction import DirectionWatch, caution
 from sensors.onboard.computer import tell_service_manager
 from sensors.onboard.keeper import Keeper, Received, State
 from sensors.onboard.robot_file import RobotFile, build_driver
@@ -51,7 +52,9 @@ class Sensing:
     """
 
     def __init__(self, robot: RobotFile, *, fail_fast: bool = False) -> None:
-        """Build every driver and open no device; raises `DriverError` or `PluginError`."""
+        """Build every driver and open no device; raises `DriverError` or `PluginError`, and `SettingError` for encoders
+        that cannot do without motor commands where no sensor brings any.
+        """
         self.trouble = ""
         self.clock = BootClock()
         self.began_ns = self.clock.now_ns()
@@ -63,6 +66,9 @@ class Sensing:
             for number, sensor in enumerate(robot.sensors)
         ]
         self._required = [k for k, sensor in zip(self._keepers, robot.sensors, strict=True) if sensor.required]
+        if found := caution(robot.world.robot, {kind for one in self._keepers for kind in one.driver.spec.kinds}):
+            raise SettingError(found.what, found.cure)
+        self._direction = DirectionWatch(robot.world.robot)
         self._supervisor = Supervisor(self._keepers, self.clock)
         self._is_over = False
 
@@ -109,6 +115,11 @@ class Sensing:
         self.trouble = self.trouble or trouble
         self._is_over = True
 
+    @property
+    def warning(self) -> str:
+        """What makes the measurements misleading though every sensor may do well, "" where nothing is known to."""
+        return str(self._direction.caution or "")
+
     def statuses(self) -> Sequence[Status]:
         """How every sensor does now."""
         return self._supervisor.statuses()
@@ -116,12 +127,17 @@ class Sensing:
     def _turn(self, beat: _Pace, report: _Pace) -> Turn:
         left_s = seconds(beat.due_ns - self.clock.now_ns())
         received = self._supervisor.take(min(max(left_s, 0.0), TAKE_S))
+        for one in received:
+            self._direction.take(one.said)
         now_ns = self.clock.now_ns()
         return Turn(now_ns, received, beat.is_due(now_ns), self._report() if report.is_due(now_ns) else None)
 
     def _report(self) -> Report:
         tell_service_manager("WATCHDOG=1")
         statuses = self.statuses()
+        for status in statuses:  # one whose device holds it up remarks nothing
+            if status.state is not State.RUNNING:
+                self._direction.lose(status.name)
         failed = [status for status in statuses if status.state is State.FAILED]
         if failed and self._fail_fast:
             self.end(failed[0].error)

@@ -37,9 +37,13 @@ class StatusTeller:
     def __init__(self, *, over_itself: bool | None = None) -> None:
         self._over_itself = sys.stderr.isatty() if over_itself is None else over_itself
         self._last: list[State] = []
+        self._is_warned = False
 
-    def tell(self, statuses: Sequence[Status], first: str = "") -> None:
-        """Tell how sensors do, after something else that belongs ``first``."""
+    def tell(self, statuses: Sequence[Status], first: str = "", warning: str = "") -> None:
+        """Tell how sensors do, after something else that belongs ``first``; a ``warning`` once, on its own line."""
+        if warning and not self._is_warned:
+            sys.stderr.write(f"\nwarning: {warning}\n")
+            self._is_warned = True
         states = [status.state for status in statuses]
         line = " | ".join(filter(None, [first, status_line(statuses)]))
         if self._over_itself:

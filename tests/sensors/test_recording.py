@@ -74,7 +74,8 @@ def test_splits_are_whole_logs_and_become_one_again(robot, tmp_path):
     done = recorded(robot(record="min_free_mb = 0.0\nsplit_s = 1.0"), tmp_path / "out", 3.3)
     parts = [read_run(path) for path in done.paths]
     assert len(parts) >= 3
-    assert not [warning for part in parts for warning in part.warnings]
+    assert not parts[0].warnings
+    assert all("`fusion join`" in warning for part in parts for warning in part.warnings)
     assert len({part.world.hash for part in parts}) == 1
     assert all(part.clocks for part in parts)
     assert all({r.sensor for r in part.remarks if r.text == "opened"} >= {"gyro", "wifi"} for part in parts)
@@ -83,6 +84,7 @@ def test_splits_are_whole_logs_and_become_one_again(robot, tmp_path):
     whole = read_run(tmp_path / "whole.mcap")
     assert list(whole.measurements) == [m for part in parts for m in part.measurements]
     assert whole.prior == parts[0].prior
+    assert not whole.warnings
     assert len(whole.remarks) == sum(len(part.remarks) for part in parts)
 
 
@@ -136,7 +138,7 @@ def test_failing_fast_ends_with_the_reason(robot, tmp_path):
 def test_a_disk_that_fills_up_ends_the_recording_cleanly(robot, tmp_path, monkeypatch):
     full = threading.Event()
     monkeypatch.setattr(split_log, "free_bytes", lambda _: 1e6 if full.is_set() else 1e12)
-    done = recorded(robot(record="min_free_mb = 100.0"), tmp_path / "out", 60.0, tell=lambda _: full.set())
+    done = recorded(robot(record="min_free_mb = 100.0"), tmp_path / "out", 60.0, tell=lambda *_: full.set())
     assert "nearly full: 99 MB less" in done.trouble
     assert not read_run(done.paths[0]).warnings
     with pytest.raises(LogError, match="remove something"):
