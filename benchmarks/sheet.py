@@ -65,7 +65,7 @@ def as_markdown(sheet: Sheet) -> str:
 
 
 def as_code(text: str) -> str:
-    """``text`` as it stands, in Markdown: what a plug-in or a log says is none.
+    """``text`` as it stands, in Markdown, whatever it holds: a plug-in's error is no markup.
 
     >>> as_code("no `x`; *none* at all")
     "`no 'x'; *none* at all`"

@@ -149,7 +149,7 @@ class FakeIio:
     def plug(self) -> None:
         """Give the device back."""
         self._folder.mkdir()
-        for file, text in {"name": "fake", "in_anglvel_scale": "0.001", CLOCK_FILE: "realtime"}.items():
+        for file, text in {"name": "mpu6050", "in_anglvel_scale": "0.001", CLOCK_FILE: "realtime"}.items():
             (self._folder / file).write_text(text + "\n")
         for letter in AXES:
             (self._folder / f"in_anglvel_{letter}_raw").write_text("10\n")

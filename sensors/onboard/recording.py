@@ -26,8 +26,8 @@ Answers = Sequence[tuple[str, Update]]
 
 
 class Recorded(NamedTuple):
-    """What came of a recording. ``trouble`` is why it ended by itself, "" where it was stopped; ``warning`` says what
-    makes it misleading all the same, "" where nothing is known to.
+    """What came of a recording. ``trouble`` is why it ended by itself, "" where it was stopped; ``warning`` is
+    what makes it misleading all the same, "" where nothing is known to.
     """
 
     paths: tuple[Path, ...]

@@ -40,7 +40,7 @@ class StatusTeller:
         self._is_warned = False
 
     def tell(self, statuses: Sequence[Status], first: str = "", warning: str = "") -> None:
-        """Tell how sensors do, after something else that belongs ``first``; a ``warning`` once, on its own line."""
+        """Write how sensors do, after something else that belongs ``first``; a ``warning`` once, on its own line."""
         if warning and not self._is_warned:
             sys.stderr.write(f"\nwarning: {warning}\n")
             self._is_warned = True

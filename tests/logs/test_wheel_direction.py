@@ -1,10 +1,12 @@
-"""Wheels whose direction nobody knows are named: in the whole of a run or in a part, for one wheel or for all."""
+"""Wheels whose direction no command states are named: in the whole of a run or in a part, for one wheel or for all."""
 
+import argparse
 import json
 
 import pytest
 
 from benchmarks.bench import bench, remarks
+from benchmarks.calibration.arguments import Findings, calibrate
 from fusion import Level, MotorCommand, Odometry, Remark, Truth, WheelTicks, World
 from fusion.cli import main
 from logs.importing import import_recordings
@@ -70,7 +72,7 @@ def test_a_run_whose_commands_hold_throughout_is_well():
     assert missed([*ticks(), command(0.0)]) is None, "arrival is no matter: the host puts it in its place"
 
 
-def test_what_rolls_before_the_first_command_is_told_with_its_length_and_its_time():
+def test_what_rolls_before_the_first_command_is_named_with_its_length_and_its_time():
     assert missed([*ticks(), command(5.5)]) == (0.51, 1.0)
 
 
@@ -103,7 +105,7 @@ def test_a_few_ticks_before_the_sensors_have_all_begun_are_no_matter():
     assert missed([*ticks(2, few + 1), command(1.5)]) == (round((few + 1) * TICK_M, 2), 1.0)
 
 
-def test_a_watch_that_saw_nothing_has_nothing_to_say():
+def test_a_watch_that_saw_nothing_warns_of_nothing():
     assert DirectionWatch(ROBOT).caution is None
     assert DirectionWatch(world(drive="none").robot).caution is None
 
@@ -140,13 +142,20 @@ def test_a_log_warns_wherever_it_is_read(log, capsys):
     assert f"fusion replay: {warning}\n" in capsys.readouterr().err
 
 
+def test_a_calibration_from_such_a_log_warns_before_its_numbers(log, capsys):
+    path = log(*ticks())
+    arguments = argparse.Namespace(runs=[path], world=None, output=None, json=None, png=None)
+    calibrate(arguments, lambda _: Findings("odometry", "none", 0, 0.0, (), ["fit"], None, None, None, {}))
+    assert capsys.readouterr().err == f"fusion calibrate odometry: {path}: {SENTENCE}\nfusion calibrate odometry: fit\n"
+
+
 def test_a_log_that_needs_no_commands_warns_of_nothing(log):
     path = log(*ticks(), encoder="quadrature")
     assert read_run(path).warnings == ()
     assert not remarks(bench([path], estimators=["dead_reckoning"], workers=1))
 
 
-def test_a_log_whose_commands_were_lost_for_a_while_says_for_how_long(log):
+def test_a_log_whose_commands_were_lost_for_a_while_shows_for_how_long(log):
     path = log(command(0.0), *ticks(), lost(4.5), command(9.5, seq=1))
     (warning,) = read_run(path).warnings
     assert "without motor commands for 0.51 m of a wheel's way, first at 5.0 s: wheels" in warning

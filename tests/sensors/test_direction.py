@@ -1,4 +1,4 @@
-"""A robot whose wheels turn in a direction that nobody knows is refused, or told of while it drives."""
+"""A robot whose wheels turn in a direction that nothing measures is refused, or warned of while it drives."""
 
 import json
 import re
@@ -27,7 +27,7 @@ PARTLY = r"single-channel encoders without motor commands for \d\.\d\d m of a wh
 
 @pytest.fixture
 def sentence(robot):
-    """What is told of the robot in room without its motor commands, everywhere."""
+    """The sentence about the robot in `room` without its motor commands, everywhere the same."""
     return str(caution(robot().world.robot, {WheelTicks}))
 
 
@@ -37,12 +37,12 @@ def recorded(robot, folder, duration_s, **options):
 
 def lived(robot, duration_s, **options):
     """Every pose, and how it ended."""
-    poses, told = live(robot, "ekf", duration_s=duration_s, **options), []
+    poses, given = live(robot, "ekf", duration_s=duration_s, **options), []
     while True:
         try:
-            told.append(next(poses))
+            given.append(next(poses))
         except StopIteration as end:
-            return told, end.value
+            return given, end.value
 
 
 def test_a_robot_file_without_motor_commands_is_refused_before_anything_runs(robot, tmp_path, sentence):
@@ -67,7 +67,7 @@ def test_a_robot_file_that_needs_no_motor_commands_is_not_refused(robot, tmp_pat
     assert recorded(sees, tmp_path / "out", 0.2).warning == ""
 
 
-def test_the_commands_say_it_in_one_sentence(tmp_path, capsys, sentence):
+def test_the_commands_give_it_in_one_sentence(tmp_path, capsys, sentence):
     path = tmp_path / "trolley.toml"
     path.write_text(robot_text(leave_out=["motors"]))
     assert main(["record", str(path), "-o", str(tmp_path / "out")]) == 1
@@ -80,12 +80,12 @@ def test_the_commands_say_it_in_one_sentence(tmp_path, capsys, sentence):
 
 
 def test_the_doctor_names_it_once_and_only_where_it_is_so(robot, tmp_path, sentence):
-    def told(robot):
+    def found(robot):
         return [str(advice) for advice in doctor.examine(robot, tmp_path) if advice.what.startswith("single-channel")]
 
-    assert told(robot(leave_out=["motors"])) == [sentence]
-    assert told(robot()) == []
-    assert told(robot(leave_out=["motors", "encoders"])) == []
+    assert found(robot(leave_out=["motors"])) == [sentence]
+    assert found(robot()) == []
+    assert found(robot(leave_out=["motors", "encoders"])) == []
 
 
 def test_motor_commands_that_are_there_need_no_word(robot, tmp_path):
@@ -117,12 +117,12 @@ def test_a_required_sensor_of_motor_commands_that_is_missing_refuses_the_start(r
 
 
 def test_every_pose_after_the_loss_of_the_motor_commands_carries_the_warning(robot, tmp_path):
-    told, ended = lived(robot(faults=MOTORS_LOST), 3.0, folder=tmp_path / "out", shadows=["dead_reckoning"])
-    assert line(told[0])["warning"] is None
-    assert line(told[-1])["warning"] == told[-1].warning
-    first = next(k for k, now in enumerate(told) if now.warning)
-    assert all(now.warning for now in told[first:])
-    assert told[-1].estimate.valid, "the pose goes on"
+    poses, ended = lived(robot(faults=MOTORS_LOST), 3.0, folder=tmp_path / "out", shadows=["dead_reckoning"])
+    assert line(poses[0])["warning"] is None
+    assert line(poses[-1])["warning"] == poses[-1].warning
+    first = next(k for k, now in enumerate(poses) if now.warning)
+    assert all(now.warning for now in poses[first:])
+    assert poses[-1].estimate.valid, "the pose goes on"
     assert "without motor commands for" in ended.trouble
     (warning,) = read_run(ended.paths[0]).warnings
     assert "without motor commands for" in warning
@@ -143,7 +143,7 @@ def test_the_commands_warn_once_while_they_run_and_at_the_end(tmp_path, capsys):
 
 
 def test_a_driver_that_its_device_holds_up_states_no_direction(robot):
-    """It remarks nothing, for it does not come back; its status tells."""
+    """It remarks nothing, for it does not come back; its status shows it."""
     sensing = Sensing(robot())
     said = [MotorCommand(0, "motors", 0, (0.6,) * 4), *(WheelTicks(k, "encoders", k, (20 * k,) * 4) for k in range(3))]
     sensing._supervisor.take = lambda _: [Received(one.time_ns, one) for one in said]

@@ -131,14 +131,14 @@ def test_the_kernels_gyro_is_found_by_name_and_told_in_its_own_scale(tmp_path):
     device = FakeIio(tmp_path)
     for file, text in {"in_temp_raw": "1000", "in_temp_offset": "12420", "in_temp_scale": "2.941176"}.items():
         (tmp_path / "iio:device0" / file).write_text(text + "\n")
-    driver = GyroIio("gyro", VirtualClock(), sysfs=str(tmp_path), device="fake")
+    driver = GyroIio("gyro", VirtualClock(), sysfs=str(tmp_path), device="mpu6050")
     info = driver.open()
-    assert (info.model, info.settings["scale"]) == ("fake", 0.001)
+    assert (info.model, info.settings["scale"]) == ("mpu6050", 0.001)
     assert (tmp_path / "iio:device0" / "current_timestamp_clock").read_text() == "monotonic"
     rate, remark = driver.poll(0.1)
     assert rate.rate_rad_s == pytest.approx(0.01)
     assert dict(remark.values)["temperature_c"] == "39.47"
-    with pytest.raises(NotFoundError, match=r"no gyro 'mpu' .*fake \(iio:device0\)"):
+    with pytest.raises(NotFoundError, match=r"no gyro 'mpu' .*mpu6050 \(iio:device0\)"):
         GyroIio("gyro", VirtualClock(), **device.settings, device="mpu").open()
 
 

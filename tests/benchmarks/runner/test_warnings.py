@@ -1,4 +1,4 @@
-"""What is wrong with a run of a suite is told where its numbers are: after `bench run`, and in the report."""
+"""What is wrong with a run of a suite stands where its numbers do: after `bench run`, and in the report."""
 
 import pytest
 
@@ -35,7 +35,7 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_each_warning_is_told_once_after_the_run_and_from_the_store(folder, capsys):
+def test_each_warning_stands_once_after_the_run_and_from_the_store(folder, capsys):
     words = [str(folder / "suite.toml"), "--store", str(folder / "store")]
     for _ in range(2):
         assert main(["bench", "run", *words, "-j", "1"]) == 0
