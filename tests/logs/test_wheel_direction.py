@@ -67,6 +67,10 @@ def test_a_run_without_commands_has_the_sentence_of_a_robot_file():
     assert caution_of_run(world("quadrature").robot, ticks(), ()) is None
 
 
+def test_a_robot_that_stood_needs_no_commands():
+    assert caution_of_run(ROBOT, ticks(per_s=0), ()) is None
+
+
 def test_a_run_whose_commands_hold_throughout_is_well():
     assert missed([command(0.0), *ticks()]) is None
     assert missed([*ticks(), command(0.0)]) is None, "arrival is no matter: the host puts it in its place"
@@ -175,6 +179,6 @@ def test_a_bundle_of_ticks_warns_when_it_is_imported(tmp_path, capsys):
     (folder / "world.toml").write_text(
         'bounds = {x_min = 0, x_max = 1, y_min = 0, y_max = 1}\nrobot.encoder = "single_channel"'
     )
-    (folder / "ticks.csv").write_text("time_s,fl,fr,rl,rr\n1,0,0,0,0\n2,9,9,9,9\n")
+    (folder / "ticks.csv").write_text("time_s,fl,fr,rl,rr\n1,0,0,0,0\n2,99,99,99,99\n")
     import_recordings("csv", folder, tmp_path / "out.mcap")
     assert capsys.readouterr().err == f"warning: {folder}: {SENTENCE}\n"
