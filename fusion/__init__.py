@@ -44,6 +44,7 @@ from fusion.estimator import Estimator, ParticleEstimator, Particles, Tag, gener
 from fusion.geometry import Covariance, Pose, wrap_angle
 from fusion.motion import Increment, compose
 from fusion.plugins import build, load, names, registered
+from fusion.screen import unusable
 from fusion.sighting import Sighting, sightings
 from fusion.track import Tracker, Update, final, track
 from fusion.values import (
@@ -140,5 +141,6 @@ __all__ = [
     "registered",
     "sightings",
     "track",
+    "unusable",
     "wrap_angle",
 ]
