@@ -167,7 +167,7 @@ def remarks(scores: Sequence[Score]) -> list[str]:
         if isinstance(warnings, list):
             told += [f"{score.run}: {warning}" for warning in warnings]
         if score.errors is None:
-            told.append(f"{score.run} holds no ground truth: no errors are scored, only time, digest, fates and NIS")
+            told.append(f"{score.run} holds no ground truth: no errors are scored, only NIS, availability and time")
         if score.error is not None:
             told.append(f"{score.run}: {score.estimator} crashed: {score.error}")
     return list(dict.fromkeys(told))

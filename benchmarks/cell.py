@@ -17,8 +17,8 @@ import numpy as np
 
 import fusion
 from benchmarks.lane import Lane, run_lane
-from benchmarks.metrics.innovations import innovation_metrics
-from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.innovations import innovation_metrics, nis_metrics
+from benchmarks.metrics.instants import availability, evaluation_instants, match
 from benchmarks.metrics.score import Errors, errors, for_json, metrics, quantile
 from benchmarks.metrics.track import Track
 from logs.reader import read_run
@@ -52,7 +52,7 @@ class Score:
 
     @cached_property
     def metrics(self) -> dict[str, float]:
-        """Metrics by id (`benchmarks.metrics.score`); empty without truth."""
+        """Metrics by id (`benchmarks.metrics.score`); empty without truth, and what needs none is among the facts."""
         return {} if self.errors is None else metrics(self.errors)
 
     def record(self) -> dict[str, object]:
@@ -85,7 +85,9 @@ def score_lane(cell: Cell, run: Run, lane: Lane) -> Score:
     """The score of a lane that was already run."""
     measured = _errors(run, lane)
     status = _status(lane, measured)
-    return Score(run.name, cell.estimator, status, lane.error, measured, {**_facts(cell, run), **_cost(run, lane)})
+    answered = {} if measured is not None else for_json({"availability": availability(lane.track)})
+    facts = {**_facts(cell, run), **answered, **_cost(run, lane)}
+    return Score(run.name, cell.estimator, status, lane.error, measured, facts)
 
 
 def crashed(cell: Cell, error: str) -> Score:
@@ -147,5 +149,5 @@ def _cost(run: Run, lane: Lane) -> dict[str, object]:
         "cpu_per_measurement_s": lane.cpu_s / len(run.measurements) if run.measurements else None,
         "fates": lane.fates.counts,
         "nis_mean": lane.fates.nis_mean,
-        **for_json(innovation_metrics(lane.fates)),
+        **for_json({**innovation_metrics(lane.fates), **nis_metrics(lane.fates)}),
     }

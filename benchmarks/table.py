@@ -10,6 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from benchmarks.cell import STATUSES, Score
+from benchmarks.metrics.innovations import NAMES
 from benchmarks.sheet import console
 
 
@@ -34,7 +35,8 @@ COLUMNS = (
     Column("availability", "avail.\n%", 100.0, 1),
     Column("cpu_per_measurement_s", "time\nµs/msg", 1e6, 0),
 )
-
+TRUTHLESS = COLUMNS[-2:]
+"""Those that need no truth."""
 
 LENGTHS = ("pos_", "abs_", "along_", "cross_", "bias_", "drms", "2drms", "max_in_outage", "energy")
 """How the ids of metrics in metres begin."""
@@ -75,26 +77,51 @@ def ranked(scores: Sequence[Score]) -> list[Score]:
 
 
 def print_tables(scores: Sequence[Score], pooled: Sequence[Score], file: IO[str] | None = None) -> None:
-    """One table per run, and one over all of them where there are several."""
+    """One table per run, and one over all of them where there are several with truth."""
     output = console(file)
     by_log: dict[object, list[Score]] = {}
     for score in scores:
         by_log.setdefault(score.facts.get("log", score.run), []).append(score)
     for own in by_log.values():
-        output.print(_table(own[0].run, own))
-    if len(by_log) > 1:
-        output.print(_table(f"all {len(by_log)} runs together", pooled))
+        output.print((_table if _is_scored(own) else _truthless)(own[0].run, own))
+    scored = sum(map(_is_scored, by_log.values()))
+    if scored > 1:
+        which = f"all {scored} runs" if scored == len(by_log) else f"the {scored} runs with truth"
+        output.print(_table(f"{which} together", pooled))
 
 
-def _table(title: str, scores: Sequence[Score]) -> Table:
+def _is_scored(scores: Sequence[Score]) -> bool:
+    return any(score.errors is not None for score in scores)
+
+
+def _truthless(run: str, scores: Sequence[Score]) -> Table:
+    """What a log without truth allows: whether readings came as far off as expected, availability and time."""
+    columns: list[Column] = []
+    for sensor in NAMES:
+        if any(f"nis_{sensor}" in score.facts for score in scores):
+            columns += [
+                Column(f"nis_{sensor}", f"{sensor}\nNIS", 1.0, 2),
+                Column(f"nis_{sensor}_low", "honest\nfrom", 1.0, 2),
+                Column(f"nis_{sensor}_high", "\nto", 1.0, 2),
+                Column(f"nis95_{sensor}", "inside\n95 %, %", 100.0, 1),
+            ]
+    return _table(f"{run}, without truth", scores, "consistency of\nestimator", (*columns, *TRUTHLESS))
+
+
+def _table(
+    title: str,
+    scores: Sequence[Score],
+    corner: str = "position error of\nestimator",
+    columns: Sequence[Column] = COLUMNS,
+) -> Table:
     table = Table(title=title, box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
-    table.add_column("position error of\nestimator", no_wrap=True)
-    for column in COLUMNS:
+    table.add_column(corner, no_wrap=True)
+    for column in columns:
         table.add_column(column.title, justify="right", no_wrap=True)
     for score in ranked(scores):
         remark = "" if score.status in ("ok", "unscored") else f" ({score.status})"
         values = {**score.facts, **score.metrics}
-        table.add_row(score.estimator + remark, *(as_text(column, values) for column in COLUMNS))
+        table.add_row(score.estimator + remark, *(as_text(column, values) for column in columns))
     return table
 
 

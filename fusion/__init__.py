@@ -43,7 +43,8 @@ from fusion.errors import (
 from fusion.estimator import Estimator, ParticleEstimator, Particles, Tag, generator
 from fusion.geometry import Covariance, Pose, wrap_angle
 from fusion.motion import Increment, compose
-from fusion.plugins import build, load, names, registered
+from fusion.plugins import build, built_in_names, load, names, registered
+from fusion.screen import unusable
 from fusion.sighting import Sighting, sightings
 from fusion.track import Tracker, Update, final, track
 from fusion.values import (
@@ -131,6 +132,7 @@ __all__ = [
     "World",
     "WorldError",
     "build",
+    "built_in_names",
     "compose",
     "digest",
     "final",
@@ -140,5 +142,6 @@ __all__ = [
     "registered",
     "sightings",
     "track",
+    "unusable",
     "wrap_angle",
 ]

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from fusion.world import World
 
+DISTRIBUTION = "fusion-localization"
 ESTIMATORS = "fusion.estimators"
 SENSORS = "fusion.sensors"
 
@@ -43,6 +44,12 @@ def names(group: str = ESTIMATORS) -> tuple[str, ...]:
     """All names installed in ``group``, sorted; nothing is imported."""
     extra = _in_process if group == ESTIMATORS else ()
     return tuple(sorted({*_entry_points(group), *extra}))
+
+
+def built_in_names() -> tuple[str, ...]:
+    """The estimators of this distribution, sorted; nothing is imported."""
+    found = _entry_points(ESTIMATORS)
+    return tuple(sorted(name for name in found if any(_owner(claim) == DISTRIBUTION for claim in found[name])))
 
 
 def load(name: str, group: str = ESTIMATORS) -> Any:  # noqa: ANN401 - whatever the entry point names

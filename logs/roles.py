@@ -32,6 +32,7 @@ NOBODY = "none"
 """Stands for a topic where a role is to stay empty."""
 FRAMES = "tf:"
 """What the truth begins with where it is a transform: ``tf:map>base_link``."""
+AS_FRAMES = "write it as 'truth=tf:map>base_link', in quotes: a shell takes > for itself"
 
 
 @dataclass
@@ -73,7 +74,7 @@ def truth_frames(topics: Mapping[str, str]) -> tuple[str, str] | None:
         return None
     parent, _, child = (frame.strip("/ ") for frame in asked.removeprefix(FRAMES).partition(">"))
     if not parent or not child:
-        raise ParameterError(f"truth: {asked!r} does not name two frames; write it as tf:map>base_link")
+        raise ParameterError(f"truth: {asked!r} does not name two frames; {AS_FRAMES}")
     return parent, child
 
 
@@ -128,7 +129,7 @@ def _named(bag: Bag, role: str, name: str, kinds: tuple[str, ...]) -> Topic:
     topic = bag.topics[name]
     if topic.type in TRANSFORM_TYPES and role == "truth":
         pairs = ", ".join(sorted(topic.names))
-        raise ParameterError(f"{bag.path}: truth: {name} holds transforms ({pairs}); say which, as tf:map>base_link")
+        raise ParameterError(f"{bag.path}: truth: {name} holds transforms ({pairs}); say which: {AS_FRAMES}")
     if topic.type not in kinds:
         raise ParameterError(f"{bag.path}: {role}: {name} is of the type {topic.type}, and not {' or '.join(kinds)}")
     if not topic.understood:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.metrics.consistency import CHI_SQUARE_95
 from benchmarks.metrics.fates import FateColumns
+from benchmarks.metrics.intervals import CEILING
 from benchmarks.metrics.quantiles import mean
+from benchmarks.metrics.samples import effective_sizes, mean_chi_square_band
 from benchmarks.metrics.track import Floats
 
 NAMES = ("wifi", "ranges", "gyro", "ticks", "command", "odom")
@@ -34,6 +37,45 @@ def innovation_metrics(fates: FateColumns) -> dict[str, float]:
             scores[f"nis95_{name}"] = mean(fates.nis[own] <= CHI_SQUARE_95[1])
             scores[f"white_{name}"] = ljung_box(series)
     return scores
+
+
+class Banded(NamedTuple):
+    """A mean, ideal 1, and the band that holds an honest filter's with 95 %."""
+
+    mean: float
+    low: float
+    high: float
+
+    @property
+    def is_inside(self) -> bool:
+        """Whether the filter may be honest."""
+        return self.low <= self.mean <= self.high
+
+
+def mean_nis(fates: FateColumns) -> dict[str, Banded]:
+    """Of every kind of sensor whose readings the estimator predicts; refused readings count, as in `nis95_wifi`.
+
+    Every reading is a scalar, so chi-square of one degree. The band takes the effective number of readings, by the
+    correlation in time of each anchor's own; what anchors have in common at one time is not in it.
+    """
+    known, found = np.isfinite(fates.nis), {}
+    for kind, name in enumerate(NAMES):
+        own = np.flatnonzero(known & (fates.kind == kind))
+        if len(own):
+            own = own[np.argsort(fates.source[own], kind="stable")]
+            nis = np.minimum(fates.nis[own], CEILING)
+            (samples,) = effective_sizes(nis[None], fates.source[own].astype(np.int64)).tolist()
+            found[name] = Banded(mean(nis), *mean_chi_square_band(1.0, samples))
+    return found
+
+
+def nis_metrics(fates: FateColumns) -> dict[str, float]:
+    """`mean_nis` by id: ``nis_wifi``, and its band ``nis_wifi_low`` and ``nis_wifi_high``."""
+    return {
+        f"nis_{name}{end}": value
+        for name, banded in mean_nis(fates).items()
+        for end, value in zip(("", "_low", "_high"), banded, strict=True)
+    }
 
 
 def ljung_box(series: Iterable[Floats]) -> float:

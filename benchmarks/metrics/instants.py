@@ -24,6 +24,8 @@ GAP_S = 0.5
 """Across a longer gap the truth is not interpolated."""
 MAX_AGE_S = 1.0
 """An older estimate counts as none."""
+MOST_INSTANTS = 1_000_000
+"""Of a run without truth: a stamp that is years off must not cost years of instants."""
 KEPT_COURSES = 2
 """Truths whose instants are kept: cells come run by run."""
 
@@ -104,6 +106,19 @@ def match(instants: Instants, track: Track, *, max_age_s: float = MAX_AGE_S) -> 
     chosen, heard = _newest(instants, track.time_ns, track.received_ns)
     since_fix_s = _since_fix_s(instants, track.received_ns, track.fix_ns)
     return _answers(instants, track.at(chosen), heard, since_fix_s, max_age_s)
+
+
+def availability(track: Track) -> float:
+    """Share of the time of a run without truth, from its first measurement to its last, that has a valid answer; NaN
+    where nothing was answered.
+    """
+    if len(track.received_ns) == 0:
+        return math.nan
+    first_ns, last_ns = track.received_ns[[0, -1]].tolist()
+    period_ns = max(nanoseconds(1.0 / RATE_HZ), (last_ns - first_ns) // MOST_INSTANTS)
+    time_ns = np.arange(first_ns, last_ns + 1, period_ns)
+    unknown = np.full(len(time_ns), math.nan)
+    return float(match(Instants(time_ns, unknown, unknown, unknown), track).valid.mean())
 
 
 def _newest(instants: Instants, stamp_ns: Whole, received_ns: Whole) -> tuple[Whole, Flags]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -9,13 +10,13 @@ from benchmarks.paper import evidence
 from benchmarks.paper.evidence import GROWN, LARGE_OUTLIER, LINEAR_R2, Held
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.published import ENVIRONMENTS
-from benchmarks.paper.summary import Share
+from benchmarks.paper.summary import Share, runs_to_exclude
 
 NEARLY_ALWAYS, NEARLY_NEVER = 0.90, 0.10
 """A claim counts as reproduced when in every environment the whole interval of its share is above the first, and as not
 when it is below the second."""
-FEWEST_RUNS = 25
-"""With fewer, even a claim that never held has an interval that reaches beyond `NEARLY_NEVER`."""
+FEWEST_RUNS = math.ceil(runs_to_exclude(0.0, NEARLY_NEVER))
+"""25. With fewer, even a claim that never held has an interval that reaches beyond `NEARLY_NEVER`."""
 REPRODUCED, NOT_REPRODUCED = "reproduced", "not reproduced"
 EVERYWHERE = tuple(environment.scenario for environment in ENVIRONMENTS)
 ARENA = EVERYWHERE[-1:]
@@ -40,6 +41,11 @@ class Judged(NamedTuple):
     shares: Mapping[str, Share]
     verdict: str
     reason: str
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether there are enough runs for its verdict to stay as it is, if the claim goes on holding as often."""
+        return runs_to_decide([*self.shares.values()]) <= min(share.total for share in self.shares.values())
 
 
 def judge(outcomes: Sequence[Outcome]) -> list[Judged]:
@@ -66,6 +72,48 @@ def verdict(shares: Sequence[Share]) -> str:
     if max(share.high for share in shares) <= NEARLY_NEVER:
         return NOT_REPRODUCED
     return f"{REPRODUCED} in {100.0 * sum(s.held for s in shares) / sum(s.total for s in shares):.0f} %"
+
+
+def runs_to_decide(shares: Sequence[Share]) -> float:
+    """How many runs of each environment decide a claim that goes on holding as often: until all shares are nearly
+    always, or all nearly never, or it is certain that neither is so. Infinite where a share is just at a limit.
+    """
+    values = [share.value for share in shares]
+    by_always = [(value >= NEARLY_ALWAYS, runs_to_exclude(value, NEARLY_ALWAYS)) for value in values]
+    by_never = [(value <= NEARLY_NEVER, runs_to_exclude(value, NEARLY_NEVER)) for value in values]
+    for by_limit in (by_always, by_never):
+        if all(kept for kept, _ in by_limit):
+            return max(FEWEST_RUNS, *(runs for _, runs in by_limit))
+    return max(FEWEST_RUNS, *(min(runs for kept, runs in by_limit if not kept) for by_limit in (by_always, by_never)))
+
+
+def in_words(judged: Sequence[Judged]) -> str:
+    """How many claims hold nearly always, nearly never and in a part of the runs, and how many runs decide the rest."""
+    decided = [each.verdict for each in judged if each.is_decided]
+    whole, missing = decided.count(REPRODUCED), decided.count(NOT_REPRODUCED)
+    counts = (
+        f"Of {len(judged)} claims {whole} hold in nearly every run, {missing} in nearly none, "
+        f"{len(decided) - whole - missing} in a part of the runs or not in every environment"
+    )
+    needed = [runs_to_decide([*each.shares.values()]) for each in judged if not each.is_decided]
+    return f"{counts}; undecided: {len(needed)}{_would_decide(needed)}."
+
+
+def _would_decide(needed: Sequence[float]) -> str:
+    """About how many runs would decide claims that need so many each."""
+    known = sorted(_two_digits(runs) for runs in needed if math.isfinite(runs))
+    if not known:
+        return ", at a limit to the run" if needed else ""
+    least, most = (f"{runs:,}".replace(",", " ") for runs in (known[0], known[-1]))
+    if len(known) < len(needed):
+        return f", which {least} runs or more would decide"
+    return f", which {f'about {least}' if least == most else f'{least} to {most}'} runs would decide"
+
+
+def _two_digits(runs: float) -> int:
+    """Rounded up: an estimate from shares that are estimates."""
+    unit: int = 10 ** max(math.ceil(math.log10(runs)) - 2, 0)
+    return math.ceil(runs / unit) * unit
 
 
 CLAIMS = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -82,10 +83,12 @@ def run_experiments(
     *,
     seed: int = 0,
     scenarios: Path | None = None,
+    estimators: Sequence[str] | None = None,
     workers: int = 1,
     progress: Progress = lambda *_: None,
 ) -> tuple[Outcome, ...]:
-    """All environments over the seeds from ``seed`` on; the same numbers whatever the workers.
+    """All environments over the seeds from ``seed`` on; the same numbers whatever the workers. ``estimators``: as
+    `run_trial` takes them.
 
     Raises `ParameterError` for seeds that calibration has used: nothing is judged on what it was fitted to.
     """
@@ -97,7 +100,7 @@ def run_experiments(
             f"seeds {seeds.start} to {seeds.stop - 1}: those from {SEEDS.start} to {SEEDS.stop - 1} are what the "
             "scenarios were calibrated on; choose another --seed"
         )
-    jobs = [job for environment in ENVIRONMENTS for job in _jobs(environment, seeds, scenarios)]
+    jobs = [job for environment in ENVIRONMENTS for job in _jobs(environment, seeds, scenarios, estimators)]
     found: dict[int, Any] = {}
     for index, result in compute(_run, _died, jobs, workers):
         found[index] = result
@@ -109,11 +112,13 @@ def run_experiments(
     )
 
 
-def _jobs(environment: Environment, seeds: range, scenarios: Path | None) -> list[Job]:
+def _jobs(
+    environment: Environment, seeds: range, scenarios: Path | None, estimators: Sequence[str] | None
+) -> list[Job]:
     """All runs of the main filling, then those of every other."""
     place = environment.place(scenarios)
     others = [calibrated_alternative(environment, filling, scenarios) for filling in ALTERNATIVES]
-    main = [Job(run_trial, place, seed) for seed in seeds]
+    main = [Job(partial(run_trial, estimators=estimators), place, seed) for seed in seeds]
     return main + [Job(run_alternative, scenario, seed) for scenario in others for seed in seeds]
 
 

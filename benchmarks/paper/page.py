@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.output import write
 from benchmarks.page import as_html, inline_png
 from benchmarks.paper.assumptions import MAIN, PREMISE
-from benchmarks.paper.claims import NOT_REPRODUCED, REPRODUCED
+from benchmarks.paper.claims import in_words
 from benchmarks.paper.figures import FIGURES
 from benchmarks.paper.published import EKF
 from benchmarks.paper.readings import literal
@@ -41,16 +41,11 @@ def markdown(report: Report, figure_link: Callable[[str], str]) -> str:
 
 def texts(report: Report) -> dict[str, str]:
     """Sentences that hang on the numbers."""
-    verdicts = [each.verdict for each in report.judged]
-    whole, missing = verdicts.count(REPRODUCED), verdicts.count(NOT_REPRODUCED)
     nearest = report.ranked[0]
     return {
         "trials": str(len(report.outcomes[0].seeds)),
         "seeds": f"{report.outcomes[0].seeds[0]} to {report.outcomes[0].seeds[-1]}",
-        "verdict": (
-            f"Of {len(verdicts)} claims {whole} hold in nearly every run, {missing} in nearly none, the other "
-            f"{len(verdicts) - whole - missing} in a part of the runs or not in every environment."
-        ),
+        "verdict": in_words(report.judged),
         "answer": answer(report),
         "factors": ", ".join(
             f"{outcome.environment.short} {outcome.scenario.calibration['odometry_factor']}"

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import fusion
 from benchmarks.arguments import at_least_one, not_negative
 from benchmarks.output import require_place, write_json
 from benchmarks.paper.calibrated import write_calibrated
+from benchmarks.paper.claims import in_words
 from benchmarks.paper.experiment import run_experiments
 from benchmarks.paper.page import write_html, write_markdown, write_png
 from benchmarks.paper.report import Report
@@ -28,18 +30,27 @@ def reproduce(
     *,
     seed: int = 0,
     scenarios: Path | None = None,
+    estimators: Sequence[str] | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Run every experiment ``trials`` times, from ``seed`` on; the same report whatever the ``workers``.
 
     ``scenarios``: a folder of scenario files that `write_calibrated` has made, None for the built-in ones.
-    ``workers`` None: one per core. Raises `ParameterError` or `WorldError` before any work.
+    ``estimators``: those that stand beside the paper's curves, None for all of this package. ``workers`` None: one per
+    core. Raises `ParameterError`, `PluginError` or `WorldError` before any work.
     """
-    chosen = os.cpu_count() or 1 if workers is None else workers
-    return Report.of(
-        run_experiments(trials, seed=seed, scenarios=scenarios, workers=chosen, progress=progress or (lambda *_: None))
+    for name in estimators or ():
+        fusion.load(name)
+    outcomes = run_experiments(
+        trials,
+        seed=seed,
+        scenarios=scenarios,
+        estimators=estimators,
+        workers=os.cpu_count() or 1 if workers is None else workers,
+        progress=progress or (lambda *_: None),
     )
+    return Report.of(outcomes)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -47,6 +58,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--trials", type=at_least_one, default=TRIALS, metavar="N", help="runs each (%(default)s)")
     parser.add_argument(
         "--seed", type=not_negative, default=0, metavar="S", help="of the first run; the next counts one up"
+    )
+    parser.add_argument(
+        "--estimators",
+        metavar="A,B",
+        help="those beside the paper's curves and the EKF; all of this package by default",
     )
     parser.add_argument("--json", type=Path, metavar="F", help="every number, in metres")
     parser.add_argument("--html", type=Path, metavar="F", help="the whole page in one file, figures in it")
@@ -75,12 +91,14 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.trials,
             seed=arguments.seed,
             scenarios=arguments.scenarios,
+            estimators=None if arguments.estimators is None else arguments.estimators.split(","),
             workers=arguments.workers,
             progress=progress,
         )
     for remark in report.remarks:
         _tell(remark)
     print_sheets(list(report.sheets.values()))
+    sys.stdout.write(f"{in_words(report.judged)}\n")
     for path, writer in writers:
         writer(report, path)
         sys.stdout.write(f"{path}\n")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +34,15 @@ class Spread(NamedTuple):
     def of(cls, values: Floats) -> Spread:
         """Of one number per seed, (n,)."""
         return cls(*(quantile(values, share) for share in (0.5, 0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0)))
+
+
+def runs_to_exclude(share: float, limit: float) -> float:
+    """How many runs it takes until the interval of a `Share` that stays at ``share`` lies on one side of ``limit``.
+
+    A Wilson interval of n runs excludes q where n (p - q)^2 >= z^2 q (1 - q); infinite for p = q.
+    """
+    z = NormalDist().inv_cdf(0.5 + LEVEL / 2.0)
+    return z**2 * limit * (1.0 - limit) / (share - limit) ** 2 if share != limit else math.inf
 
 
 class Share(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -67,13 +67,18 @@ def _scenario(place: str | Path) -> Scenario:
     return load_scenario(place)
 
 
-def run_trial(task: tuple[str | Path, int]) -> Trial:
-    """Of a scenario, built in or a file, and a seed: a pure function of both and of the installed estimators."""
+def run_trial(task: tuple[str | Path, int], estimators: Sequence[str] | None = None) -> Trial:
+    """Of a scenario, built in or a file, and a seed: a pure function of both and of the estimators.
+
+    ``estimators`` None: those of this package, for what else is installed must not change the paper's tables. The
+    paper's curves and the filter to beat are always among them.
+    """
     place, seed = task
+    chosen = {*(fusion.built_in_names() if estimators is None else estimators), ODOMETRY, WIFI, PROPOSED, EKF}
     scenario = _scenario(place)
     whole = simulated_run(scenario, seed)
     plain, aided = without_gyro(whole), with_gyro(whole, scenario.reality)
-    lanes = {name: (plain, run_lane(plain, name, seed=seed)) for name in fusion.names()}
+    lanes = {name: (plain, run_lane(plain, name, seed=seed)) for name in sorted(chosen)}
     lanes |= {name + GYRO: (aided, run_lane(aided, name, seed=seed)) for name in GYRO_LANES}
     brief = leg_by_leg(plain)
     return Trial(

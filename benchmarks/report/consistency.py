@@ -9,16 +9,15 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from benchmarks.metrics.innovations import NAMES
+from benchmarks.metrics.innovations import NAMES, Banded
 from benchmarks.metrics.track import Floats
 from benchmarks.plotting import plain_colour
-from benchmarks.report.innovations import Banded, nis_of_cells
+from benchmarks.report.innovations import nis_of_cells
 from benchmarks.report.material import Material
 from benchmarks.report.panel import Panel, height_of
 from benchmarks.runner.results import Result, by_contestant
 
 BAND = ("anees", "anees_band_low", "anees_band_high")
-
 
 Judged = tuple[Result, Banded]
 """A cell, and the mean of what is judged of it."""

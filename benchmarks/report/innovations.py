@@ -3,49 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.metrics.fates import FateColumns
-from benchmarks.metrics.innovations import NAMES
-from benchmarks.metrics.intervals import CEILING
-from benchmarks.metrics.quantiles import mean
-from benchmarks.metrics.samples import effective_sizes, mean_chi_square_band
+from benchmarks.metrics.innovations import NAMES, Banded, mean_nis
 from benchmarks.report.cells import link
 from benchmarks.report.material import Material
 from benchmarks.runner.results import by_contestant, median_metrics
 from benchmarks.sheet import Sheet
-
-
-class Banded(NamedTuple):
-    """A mean, ideal 1, and the band that holds an honest filter's with 95 %."""
-
-    mean: float
-    low: float
-    high: float
-
-    @property
-    def is_inside(self) -> bool:
-        """Whether the filter may be honest."""
-        return self.low <= self.mean <= self.high
-
-
-def mean_nis(fates: FateColumns) -> dict[str, Banded]:
-    """Of every kind of sensor whose readings the estimator predicts; refused readings count, as in `nis95_wifi`.
-
-    Every reading is a scalar, so chi-square of one degree. The band takes the effective number of readings, by the
-    correlation in time of each anchor's own; what anchors have in common at one time is not in it.
-    """
-    known, found = np.isfinite(fates.nis), {}
-    for kind, name in enumerate(NAMES):
-        own = np.flatnonzero(known & (fates.kind == kind))
-        if len(own):
-            own = own[np.argsort(fates.source[own], kind="stable")]
-            nis = np.minimum(fates.nis[own], CEILING)
-            (samples,) = effective_sizes(nis[None], fates.source[own].astype(np.int64)).tolist()
-            found[name] = Banded(mean(nis), *mean_chi_square_band(1.0, samples))
-    return found
 
 
 def nis_of_cells(material: Material) -> dict[tuple[str, str], dict[str, Banded]]:

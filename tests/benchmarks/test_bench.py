@@ -13,7 +13,22 @@ from benchmarks.cell import Score
 from benchmarks.lane import run_lane
 from benchmarks.prior import starting_prior
 from benchmarks.table import print_tables, ranked
-from fusion import Covariance, Decision, Estimate, LogError, Odometry, ParameterError, PluginError, Pose, Prior, Truth
+from fusion import (
+    Covariance,
+    Decision,
+    Estimate,
+    Fate,
+    LogError,
+    Odometry,
+    ParameterError,
+    PluginError,
+    Pose,
+    Prior,
+    RangeReading,
+    Ranges,
+    Reason,
+    Truth,
+)
 from fusion.cli import main
 from logs.run import Run, TruthTrack
 from logs.writer import RunWriter
@@ -154,7 +169,53 @@ def test_log_without_truth_says_so_and_reports_the_rest(tmp_path, capsys):
     assert scores[0].record()["digest"]
     assert [remark for remark in remarks(scores) if "no ground truth" in remark]
     print_tables(scores, pooled(scores))
-    assert "toy_wheels" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "toy_wheels" in out
+    assert "RMSE" not in out
+
+
+class Hears(Wheels):
+    """Expects every range to be 5 m, 0.5 m sure; answers nothing valid in the first second."""
+
+    def step(self, state, measurement):
+        state, _ = super().step(state, measurement)
+        if not isinstance(measurement, Ranges):
+            return state, ()
+        who = (measurement.time_ns, measurement.sensor, measurement.seq)
+        error = measurement.readings[0].range_m - 5.0
+        return state, (Fate(*who, "a", Decision.USED, Reason.OK, 1.0, error, 0.25, error**2 / 0.25),)
+
+    def estimate(self, state, time_ns):
+        return super().estimate(state, time_ns)._replace(valid=time_ns > 1_000_000_000)
+
+
+@pytest.mark.parametrize(("error_m", "honest"), [(0.5, True), (1.5, False)])
+def test_log_without_truth_shows_consistency_availability_and_time(tmp_path, capsys, error_m, honest):
+    """Ranges off by plus and minus so much, forty of them from 0.1 s to 4 s: NIS 1, or 9."""
+    world = fusion.World.from_table({"anchors": [{"id": "a", "position_m": [0, 0]}]})
+    with RunWriter(tmp_path / "run.mcap", world, name="run") as writer:
+        for k in range(1, 41):
+            writer.write(Ranges(k * TENTH_NS, "uwb", k, (RangeReading("a", 5.0 + error_m * (-1) ** (k // 2)),)))
+    with fusion.registered("toy_hears", Hears):
+        (score,) = bench([tmp_path / "run.mcap"], estimators=["toy_hears"], workers=1)
+    record = json.loads(json.dumps(score.record(), allow_nan=False))
+    assert record["nis_ranges"] == pytest.approx(error_m**2 / 0.25)
+    assert (record["nis_ranges_low"] < record["nis_ranges"] < record["nis_ranges_high"]) == honest
+    assert record["availability"] == pytest.approx(30 / 40)
+    print_tables([score], pooled([score]))
+    (row,) = [line for line in capsys.readouterr().out.splitlines() if "toy_hears" in line]
+    band = [f"{record[f'nis_ranges{end}']:.2f}" for end in ("", "_low", "_high")]
+    inside = "100.0" if honest else "0.0"
+    assert row.split() == ["toy_hears", *band, inside, "75.0", f"{1e6 * record['cpu_per_measurement_s']:.0f}"]
+
+
+def test_runs_without_truth_stay_out_of_the_table_of_all(tmp_path, capsys):
+    logs = [write_run(tmp_path / f"{k}" / "run.mcap", truth=k > 0) for k in range(3)]
+    scores = bench(logs, estimators=["toy_wheels"], workers=1)
+    print_tables(scores, pooled(scores))
+    assert "the 2 runs with truth together" in capsys.readouterr().out
+    print_tables(scores[:2], pooled(scores[:2]))
+    assert "together" not in capsys.readouterr().out
 
 
 def test_pooled_figures_take_all_instants_of_all_runs(tmp_path):

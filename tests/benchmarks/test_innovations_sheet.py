@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics.fates import FateColumns
-from benchmarks.report.innovations import innovations, mean_nis
+from benchmarks.metrics.innovations import mean_nis
+from benchmarks.report.innovations import innovations
 from benchmarks.report.material import Material
 from benchmarks.report.verb import report
 from benchmarks.runner.definition import load_suite

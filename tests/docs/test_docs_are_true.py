@@ -1,5 +1,6 @@
-"""Every Python block of README and docs runs, page by page; the world file of the docs loads."""
+"""Every Python block of README and docs runs, page by page; the world file of the docs loads; what they name exists."""
 
+import importlib
 import re
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from fusion.cli import VERBS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+TEXTS = [*PAGES, ROOT / "CHANGELOG.md"]
+ROOMS = "fusion|sensors|estimators|logs|benchmarks"
 
 
 def blocks(page, language):
@@ -54,3 +57,23 @@ def test_every_command_shown_exists(page):
 def test_every_page_linked_to_exists(page):
     for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
         assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: page.name)
+def test_every_python_name_of_a_page_exists(page):
+    for room, rest in re.findall(rf"`({ROOMS})((?:\.\w+)+)(?=[`(])", page.read_text(encoding="utf-8")):
+        assert resolved([room, *rest.strip(".").split(".")]) is not None, room + rest
+
+
+def resolved(parts):
+    """The object of a dotted name: modules as far as there are any, then attributes."""
+    found = importlib.import_module(parts[0])
+    for k, part in enumerate(parts[1:], start=2):
+        found = getattr(found, part, None) or importlib.import_module(".".join(parts[:k]))
+    return found
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: page.name)
+def test_every_script_named_exists(page):
+    for script in re.findall(r"\w[\w/]*/[a-z0-9_]+\.py\b", page.read_text(encoding="utf-8")):
+        assert (ROOT / script).is_file(), script

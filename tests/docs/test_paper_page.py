@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.paper.claims import CLAIMS, Judged, in_words, verdict
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, WIFI
+from benchmarks.paper.summary import Share
 from benchmarks.paper.tables import spread_cm
 from benchmarks.paper.trial import run_trial
 
@@ -56,6 +58,15 @@ def test_page_shows_what_the_record_holds(k):
     for lane in (ODOMETRY, WIFI):
         largest = np.array(RECORD["environments"][k]["largest_m"][lane], dtype=float)
         assert f"| {spread_cm(largest)} |" in PAGE, COMMAND
+
+
+def test_page_counts_the_verdicts_of_the_record():
+    judged = []
+    for claim, found in zip(CLAIMS, RECORD["claims"], strict=True):
+        shares = {title: Share.of(np.arange(held["of"]) < held["runs"]) for title, held in found["held"].items()}
+        assert verdict([*shares.values()]) == found["verdict"], COMMAND
+        judged.append(Judged(claim, shares, found["verdict"], found["reason"]))
+    assert in_words(judged) in PAGE, COMMAND
 
 
 @pytest.mark.parametrize("k", range(3))

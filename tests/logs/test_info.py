@@ -311,3 +311,34 @@ def test_json_of_a_damaged_log_holds_what_repair_would_tell(tmp_path, log, capsy
     damage = describe(log)["damage"]
     assert main(["repair", str(log), "-o", str(tmp_path / "good.mcap"), "--json"]) == 3
     assert damage.items() <= json.loads(capsys.readouterr().out).items()
+
+
+def parts_of(folder, *recordings):
+    for number, recording in enumerate(recordings):
+        about = {} if recording is None else {"recording": recording, "split": str(number)}
+        with RunWriter(folder / f"part-{number}.mcap", WORLD, name=f"part-{number}", metadata=about) as writer:
+            writer.write(Gyro(SECOND, "g", 1, 0.0))
+
+
+def test_folder_of_logs_is_each_log_in_it(tmp_path, capsys):
+    parts_of(tmp_path, "a", "a")
+    (tmp_path / "part-2.mcap").write_text("cut to nothing")
+    assert main(["info", str(tmp_path)]) == 1
+    out, err = capsys.readouterr()
+    assert "not a log of fusion" not in out
+    assert out.index("part-0: ") < out.index("part-1: ")
+    assert out.endswith(f"\nparts of one recording; one log of them: fusion join {tmp_path} -o RUN.mcap\n")
+    assert "part-2.mcap: is no MCAP file" in err
+
+
+@pytest.mark.parametrize("recordings", [("a", "b"), (None, None), ("a",)])
+def test_only_parts_of_one_recording_are_to_be_joined(tmp_path, recordings, capsys):
+    parts_of(tmp_path, *recordings)
+    assert main(["info", str(tmp_path)]) == 0
+    assert "fusion join" not in capsys.readouterr().out
+
+
+def test_json_of_a_folder_of_logs_is_a_list_even_of_one(tmp_path, capsys):
+    parts_of(tmp_path, "a")
+    assert main(["info", str(tmp_path), "--json"]) == 0
+    assert [about["name"] for about in json.loads(capsys.readouterr().out)] == ["part-0"]

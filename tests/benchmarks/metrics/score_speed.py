@@ -1,13 +1,18 @@
-"""What it costs to score: one pair of 1 000 poses in a warm process, by kinds of metrics, and stored cells scored anew.
+"""What it costs to score: one pair of 1 000 poses in a warm process, by kinds of metrics, and stored cells scored anew;
+and two files of 100 000 poses by ``fusion bench score``, a process of its own.
 
 Run it from the top folder, with one thread: ``OMP_NUM_THREADS=1 python tests/benchmarks/metrics/score_speed.py``. Times
 are processor time, the least of many rounds over pairs that differ; the last column is a multiple of the anchor, one
 transform of eight series as long as the pair and back, timed in the same rounds.
 """
 
+import os
+import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -121,6 +126,40 @@ def _each_us(work: Callable, inputs: list) -> float:
     return (time.process_time_ns() - started_ns) / len(inputs) / 1e3
 
 
+class FilesCost(NamedTuple):
+    """Processor time [s] and peak resident memory [MB] of one ``fusion bench score``."""
+
+    cpu_s: float
+    rss_mb: float
+
+
+def measure_files(poses: int = 100_000, rounds: int = 3, words: tuple[str, ...] = ()) -> FilesCost:
+    """The least of each over ``rounds`` processes that read and score two TUM files of a pair as `measure` draws it."""
+    instants, track = Pair.drawn(poses, seed=1)
+    with tempfile.TemporaryDirectory() as folder:
+        files = [Path(folder) / name for name in ("truth.tum", "estimate.tum")]
+        truth = instants.x, instants.y, instants.heading
+        for file, (x, y, heading) in zip(files, (truth, track.pose.T), strict=True):
+            z = np.zeros(poses)
+            rows = [1e-9 * track.time_ns, x, y, z, z, z, np.sin(heading / 2.0), np.cos(heading / 2.0)]
+            np.savetxt(file, np.column_stack(rows), fmt="%.6f")
+        pair = ["--truth", str(files[0]), "--estimate", str(files[1]), *words]
+        costs = [_process([sys.executable, "-m", "fusion.cli", "bench", "score", *pair]) for _ in range(rounds)]
+    return FilesCost(min(cost.cpu_s for cost in costs), min(cost.rss_mb for cost in costs))
+
+
+def _process(command: list[str]) -> FilesCost:
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f"{' '.join(command)} failed")
+    return FilesCost(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0)
+
+
 if __name__ == "__main__":
     for cost in measure(*map(int, sys.argv[1:])):
         sys.stdout.write(f"{cost.what:30s} {cost.least_us:8.0f} µs {cost.ratio:7.2f}\n")
+    for words in ((), ("--mode", "interp"), ("--align", "se2")):
+        files = measure_files(words=words)
+        sys.stdout.write(f"{' '.join(('files', *words)):30s} {files.cpu_s:8.2f} s  {files.rss_mb:7.0f} MB\n")

@@ -63,3 +63,12 @@ def test_cost_of_a_pair_is_told_by_kinds_of_metrics():
     assert set(costs) > {told["ANCHOR"], told["PAIR"], told["RESCORED"], "match", "errors", "trajectory"}
     assert costs[told["ANCHOR"]].ratio == 1.0
     assert all(cost.least_us > 0.0 for cost in costs.values())
+
+
+def test_cost_of_two_files_is_that_of_a_process_that_scored_them():
+    told = runpy.run_path(str(Path(__file__).with_name("score_speed.py")))
+    cost = told["measure_files"](poses=50, rounds=1)
+    assert cost.cpu_s > 0.0
+    assert cost.rss_mb > 10.0
+    with pytest.raises(SystemExit, match="failed"):
+        told["measure_files"](poses=50, rounds=1, words=("--mode", "none"))

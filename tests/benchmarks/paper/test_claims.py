@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.paper import evidence
-from benchmarks.paper.claims import CLAIMS, judge, verdict
+from benchmarks.paper.claims import CLAIMS, FEWEST_RUNS, Judged, in_words, judge, runs_to_decide, verdict
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.moves import MOVES_M
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
@@ -124,6 +124,74 @@ def test_refusals_are_weighed_against_what_was_refused():
 )
 def test_verdict(shares, expected):
     assert verdict([Share.of(np.arange(total) < held) for held, total in shares]) == expected
+
+
+def shares_of(*held):
+    return {str(k): Share.of(np.arange(total) < kept) for k, (kept, total) in enumerate(held)}
+
+
+def judged_of(*held):
+    shares = shares_of(*held)
+    return Judged(CLAIMS[0], shares, verdict([*shares.values()]), "")
+
+
+@pytest.mark.parametrize("held", [[(20, 20)], [(0, 20)], [(10, 20)], [(20, 20), (0, 20)]])
+def test_clear_shares_are_decided_by_the_fewest_runs(held):
+    assert runs_to_decide([*shares_of(*held).values()]) == FEWEST_RUNS == 25
+
+
+@pytest.mark.parametrize("held", [[(19, 20)], [(1, 20)], [(17, 20)], [(19, 20), (20, 20)], [(19, 20), (17, 20)]])
+def test_so_many_runs_at_the_same_shares_decide_and_one_twentieth_fewer_do_not(held):
+    """By the intervals themselves: each on one side of both limits, or the verdict is one of the two."""
+    needed = runs_to_decide([*shares_of(*held).values()])
+    assert np.isfinite(needed)
+    assert needed > FEWEST_RUNS
+    for total, decided in ((20 * int(np.ceil(needed / 20)), True), (20 * int((needed - 1e-9) // 20), False)):
+        again = judged_of(*((kept * total // 20, total) for kept, _ in held))
+        assert again.is_decided == decided
+        possible = (
+            min(share.high for share in again.shares.values()) > 0.9,
+            max(share.low for share in again.shares.values()) < 0.1,
+        )
+        clear = again.verdict in ("reproduced", "not reproduced") or not any(possible)
+        assert clear == decided
+
+
+def test_share_at_a_limit_is_decided_by_no_number_of_runs():
+    assert runs_to_decide([*shares_of((18, 20)).values()]) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("claims", "sentence"),
+    [
+        pytest.param(
+            [judged_of((20, 20)), judged_of((10, 20)), judged_of((1, 20))],
+            "Of 3 claims 0 hold in nearly every run, 0 in nearly none, 0 in a part of the runs or not in every "
+            "environment; undecided: 3, which 25 to 98 runs would decide.",
+            id="too few runs",
+        ),
+        pytest.param(
+            [judged_of((200, 200)), judged_of((0, 200)), judged_of((100, 200)), judged_of((18, 200))],
+            "Of 4 claims 1 hold in nearly every run, 1 in nearly none, 1 in a part of the runs or not in every "
+            "environment; undecided: 1, which about 2 500 runs would decide.",
+            id="one near a limit",
+        ),
+        pytest.param(
+            [judged_of((18, 20)), judged_of((0, 20))],
+            "Of 2 claims 0 hold in nearly every run, 0 in nearly none, 0 in a part of the runs or not in every "
+            "environment; undecided: 2, which 25 runs or more would decide.",
+            id="one at a limit",
+        ),
+        pytest.param(
+            [judged_of((30, 30))],
+            "Of 1 claims 1 hold in nearly every run, 0 in nearly none, 0 in a part of the runs or not in every "
+            "environment; undecided: 0.",
+            id="none",
+        ),
+    ],
+)
+def test_claims_in_words_count_the_undecided_and_what_would_decide_them(claims, sentence):
+    assert in_words(claims) == sentence
 
 
 def test_every_claim_is_judged_on_its_environments_with_a_reason():

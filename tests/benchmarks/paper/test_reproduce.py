@@ -12,10 +12,11 @@ from benchmarks.metrics.instants import evaluation_instants, match
 from benchmarks.metrics.score import errors
 from benchmarks.paper import reproduce as module
 from benchmarks.paper.calibrate import SEEDS
+from benchmarks.paper.claims import in_words
 from benchmarks.paper.experiment import run_experiments
 from benchmarks.paper.figures import FIGURES
 from benchmarks.paper.page import markdown
-from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
+from benchmarks.paper.published import EKF, ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.readings import ORIGINS_M, READINGS, literal
 from benchmarks.paper.reproduce import reproduce
 from benchmarks.paper.trial import GYRO, GYRO_LANES, run_alternative, run_trial
@@ -52,7 +53,7 @@ def test_a_seed_gives_its_run_whichever_is_the_first(report):
 
 def test_every_estimator_runs_on_the_same_runs_and_some_on_a_gyro(report):
     for outcome in report.outcomes:
-        assert set(outcome.errors) == {*fusion.names(), *(name + GYRO for name in GYRO_LANES)}
+        assert set(outcome.errors) == {*fusion.built_in_names(), *(name + GYRO for name in GYRO_LANES)}
         assert {e.shape for e in outcome.errors.values()} == {(2, outcome.environment.trial_points, 2)}
         assert not outcome.crashes
 
@@ -83,24 +84,38 @@ def test_alternative_of_the_main_scenario_is_the_trial_itself():
     assert brief["coordinate"] == pytest.approx(np.abs(whole.errors[PROPOSED]).max(), abs=1e-6)
 
 
-def test_estimator_that_crashes_costs_its_own_lane_and_is_told(monkeypatch):
-    class Broken:
-        summary, tags = "breaks", frozenset()
+class Broken:
+    summary, tags = "breaks", frozenset()
 
-        def __init__(self, world):
-            pass
+    def __init__(self, world):
+        pass
 
-        def start(self, prior, seed):
-            raise ZeroDivisionError
+    def start(self, prior, seed):
+        raise ZeroDivisionError
 
-        def step(self, state, measurement):
-            return state, ()
+    def step(self, state, measurement):
+        return state, ()
 
-        def estimate(self, state, time_ns):
-            raise NotImplementedError
+    def estimate(self, state, time_ns):
+        raise NotImplementedError
 
+
+def test_what_else_is_installed_stays_out_of_the_paper_unless_it_is_asked_for():
+    needed = {ODOMETRY, WIFI, PROPOSED, EKF, *(name + GYRO for name in GYRO_LANES)}
     with fusion.registered("broken", Broken):
-        trial = run_trial(("paper_office", 0))
+        assert "broken" not in run_trial(("paper_office", 0)).errors
+        (asked, *_) = run_experiments(1, estimators=["broken", "particle"])
+    assert set(asked.errors) == {"broken", "particle", *needed}
+
+
+def test_unknown_estimator_is_refused_before_any_work(capsys):
+    assert main(["reproduce", "--estimators", "ekf,particel"]) == 1
+    assert "did you mean 'particle'" in capsys.readouterr().err
+
+
+def test_estimator_that_crashes_costs_its_own_lane_and_is_told():
+    with fusion.registered("broken", Broken):
+        trial = run_trial(("paper_office", 0), estimators=["broken"])
     assert "ZeroDivisionError" in trial.crashes["broken"]
     assert np.isinf(trial.errors["broken"]).all()
     assert np.isfinite(trial.errors["ekf"]).all()
@@ -140,6 +155,7 @@ def test_page_has_every_table_and_figure_and_leaves_no_place_open(report):
     assert all(as_markdown(sheet) in text for sheet in report.sheets.values())
     assert all(f"]({name}.png)" in text for name in FIGURES)
     assert "cannot tell from 2 runs" in text
+    assert f"{in_words(report.judged)} How often" in text
 
 
 def test_command_prints_tables_and_writes_what_is_asked(report, tmp_path, monkeypatch, capsys):
@@ -153,11 +169,14 @@ def test_command_prints_tables_and_writes_what_is_asked(report, tmp_path, monkey
     files = {kind: tmp_path / f"paper.{kind}" for kind in ("json", "html", "png")}
     page = tmp_path / "docs" / "paper.md"
     words = [word for kind, path in files.items() for word in (f"--{kind}", str(path))]
-    assert main(["reproduce", "--trials", "2", "--seed", "5", *words, "--markdown", str(page)]) == 0
-    assert (asked["trials"], asked["seed"]) == (2, 5)
+    assert (
+        main(["reproduce", "--trials", "2", "--seed", "5", *words, "--markdown", str(page), "--estimators", "ekf"]) == 0
+    )
+    assert (asked["trials"], asked["seed"], asked["estimators"]) == (2, 5, ["ekf"])
     out = capsys.readouterr().out
     for sheet in report.sheets.values():
         assert sheet.title.split(":")[0] in out
+    assert f"\n{in_words(report.judged)}\n" in out
     assert json.loads(files["json"].read_text()) == report.record()
     assert files["png"].read_bytes().startswith(b"\x89PNG")
     assert {path.name for path in page.parent.iterdir()} == {"paper.md", *(f"paper-{name}.png" for name in FIGURES)}
