@@ -15,7 +15,7 @@ from benchmarks.report.material import Material
 from benchmarks.report.verb import as_page
 from benchmarks.review.picture import render
 from benchmarks.review.review import review
-from benchmarks.review.viewer import has_display, open_viewer
+from benchmarks.review.window import has_display, open_viewer
 from benchmarks.runner.definition import load_suite
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store

@@ -25,7 +25,8 @@ from benchmarks.review.moments import Moment, worst_moments
 from benchmarks.review.picture import render
 from benchmarks.review.scene import SUFFIX, write_scene
 from benchmarks.review.subject import own_log, remarks, subject, subject_options, words
-from benchmarks.review.viewer import has_display, open_viewer, require_rerun, serve_web
+from benchmarks.review.viewer import require_rerun
+from benchmarks.review.window import has_display, open_viewer, serve_web
 from fusion import ParameterError, ViewerError
 from logs.run import Run
 
