@@ -77,10 +77,13 @@ class Viewer(NamedTuple):
         """The answer to ``question``, which asks for what is ``wanted``. Raises `ViewerError` where none comes in time,
         or it raises anything: it checks the answer, too.
         """
+        return self._ask(wanted, question, self.patience.answer_s)
+
+    def _ask(self, wanted: str, question: Callable[[], Answer], limit_s: float) -> Answer:
         answer: futures.Future[Answer] = futures.Future()
         # Not by an executor, which waits for its threads when the program ends.
         Thread(target=_answer, args=(question, answer), daemon=True).start()
-        futures.wait([answer], self.patience.answer_s)
+        futures.wait([answer], limit_s)
         if not answer.done():
             raise self._silence(wanted)
         if (error := answer.exception()) is not None:
@@ -90,10 +93,10 @@ class Viewer(NamedTuple):
     def until(self, wanted: str, question: Callable[[], Answer | None]) -> Answer:
         """The first answer that is not None; raises `ViewerError` as `ask` does."""
         deadline = time.monotonic() + self.patience.answer_s
-        while time.monotonic() < deadline:
+        while (left_s := deadline - time.monotonic()) > 0.0:
             if (ending := self._ending()) is not None:
                 raise ViewerError(ending)
-            answer = self.ask(wanted, question)
+            answer = self._ask(wanted, question, left_s)
             if answer is not None:
                 return answer
             time.sleep(self.patience.pause_s)
