@@ -3,40 +3,58 @@
 from __future__ import annotations
 
 import argparse
+import os
+import shlex
+import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import fusion
 from benchmarks.arguments import not_negative
 from benchmarks.bench import bench, pooled, remarks, write_records
 from benchmarks.cell import Score
+from benchmarks.lane import Lane
 from benchmarks.output import write
 from benchmarks.report.material import Material
 from benchmarks.report.verb import as_page
+from benchmarks.review.folding import fold
 from benchmarks.review.picture import render
-from benchmarks.review.review import review
-from benchmarks.review.viewer import has_display, open_viewer
+from benchmarks.review.plain_picture import draw_plainly
+from benchmarks.review.scene import write_scene
+from benchmarks.review.subject import own_log
+from benchmarks.review.window import has_display, open_viewer
 from benchmarks.runner.definition import load_suite
 from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
 from benchmarks.table import print_tables
 from fusion import FusionError, ViewerError
+from logs.run import Run
 from sensors.simulation.simulate import simulate
 
 SCENARIO = "office"
 SUITE = Path("quick")
 
 
-class Demo(NamedTuple):
-    """What a demo leaves behind. ``scene`` and ``picture`` are None where Rerun cannot be used, ``page`` where figures
-    cannot be drawn.
+class Drawn(NamedTuple):
+    """The review of a demo, as far as this machine can make one: ``scene`` is None without Rerun, ``picture`` where
+    matplotlib is missing, too. ``rendered``: the picture is Rerun's.
     """
+
+    scene: Path | None
+    picture: Path | None
+    rendered: bool
+
+
+class Demo(NamedTuple):
+    """What a demo leaves behind. ``page`` is None where figures cannot be drawn."""
 
     log: Path
     records: Path
     scores: list[Score]
-    scene: Path | None
-    picture: Path | None
+    drawn: Drawn
+    suite: Path
     page: Path | None
 
 
@@ -49,8 +67,9 @@ def demo(
     workers: int | None = None,
 ) -> Demo:
     """Simulate the office, record it, score every installed estimator on the record, and draw all that into
-    ``folder``: ``run.mcap``, ``scores.json``, ``review.rrd``, ``review.png``. ``duration_s`` cuts the run short. Then
-    compare a few estimators over several runs: ``suite``, its results in ``bench``, as ``report.html``.
+    ``folder``: ``run.mcap``, ``scores.json``, ``review.rrd``, ``review.png``, which is by matplotlib where Rerun cannot
+    draw. ``duration_s`` cuts the run short. Then compare a few estimators over several runs: ``suite``, its results in
+    ``bench``, as ``report.html``.
 
     Progress and what could not be drawn are told on stderr.
     """
@@ -63,20 +82,32 @@ def demo(
         _tell(remark)
     records = folder / "scores.json"
     write_records(scores, records)
-    scene, picture = _draw(log, folder, seed)
-    return Demo(log, records, scores, scene, picture, _report(suite, folder, workers))
+    drawn = _draw(own_log(log), folder, seed)
+    return Demo(log, records, scores, drawn, suite, _report(suite, folder, workers))
 
 
-def _draw(log: Path, folder: Path, seed: int) -> tuple[Path | None, Path | None]:
-    """The review and its picture, as far as this machine can make them; the scores do not depend on it."""
-    scene: Path | None = None
+def _draw(run: Run, folder: Path, seed: int) -> Drawn:
+    """The review and its picture; the scores of the demo do not depend on them."""
+    _tell("drawing the review")
+    lanes, scores = fold(run, {name: {} for name in fusion.names()}, seed)
+    scene, picture = None, folder / "review.png"
     try:
-        _tell("drawing the review")
-        (scene,) = review(log, save=folder / "review.rrd", seed=seed).files
-        return scene, render([scene], folder / "review.png")
+        (scene,) = write_scene(folder / "review.rrd", run, lanes, scores)
+        return Drawn(scene, render([scene], picture), rendered=True)
     except ViewerError as error:
-        _tell(f"no {'picture' if scene else 'review'}: {error}")
-        return scene, None
+        return Drawn(scene, _draw_instead(run, lanes, scores, picture, error), rendered=False)
+
+
+def _draw_instead(
+    run: Run, lanes: Sequence[Lane], scores: Sequence[Score], picture: Path, why: ViewerError
+) -> Path | None:
+    try:
+        draw_plainly(run, lanes, scores, picture)
+    except FusionError as error:
+        _tell(f"no picture: {why}; {error}")
+        return None
+    _tell(f"{picture} is by matplotlib, not by Rerun: {why}")
+    return picture
 
 
 def _report(suite: Path, folder: Path, workers: int | None) -> Path | None:
@@ -108,22 +139,44 @@ def run(arguments: argparse.Namespace) -> int:
     """Make the demo, print its table, show it, and say what to try next. Exit code 1 when no estimator survived."""
     made = demo(arguments.output, seed=arguments.seed)
     print_tables(made.scores, pooled(made.scores))
-    for path in (made.log, made.records, made.scene, made.picture, made.page):
+    for path in (made.log, made.records, made.drawn.scene, made.drawn.picture, made.page):
         if path is not None:
             sys.stdout.write(f"{path}\n")
-    if made.scene is not None and not arguments.no_view and has_display():
-        open_viewer([made.scene])
-    sys.stdout.write(_next(made))
+    window = has_display() and (made.drawn.rendered if arguments.no_view else _show(made.drawn.scene))
+    sys.stdout.write("\nTry next:\n")
+    sys.stdout.writelines(f"  {command}\n" for command in next_commands(made, window=window))
     return 1 if all(score.status == "crashed" for score in made.scores) else 0
 
 
-def _next(made: Demo) -> str:
-    view = f"fusion review {made.log}"
-    if not has_display():
-        view += f" --estimators ekf,particle --png {made.log.with_name('two.png')}"
-    return (
-        "\nTry next:\n"
-        f"  {view}\n"
-        f"  fusion bench {made.log} --estimators ekf --set ekf.gate_probability=0.99\n"
-        f"  fusion bench compare {SUITE} --store {made.log.with_name('bench')}\n"
-    )
+def _show(scene: Path | None) -> bool:
+    """Whether the viewer is open now."""
+    if scene is None:
+        return False
+    try:
+        open_viewer([scene])
+    except ViewerError as error:
+        _tell(f"no window: {error}")
+        return False
+    return True
+
+
+def next_commands(made: Demo, *, window: bool) -> list[str]:
+    """What to try next, for a shell in this folder; ``window``: whether a viewer can be opened."""
+    review, bench = ["review", str(made.log)], ["bench", str(made.log), "--estimators", "ekf"]
+    if not window:
+        picture = ["--estimators", "ekf,particle", "--png", str(made.log.with_name("two.png"))]
+        review += picture if made.drawn.rendered else ["--estimators", "ekf", "--worst", "3"]
+    bench += ["--set", "ekf.gate_probability=0.99"]
+    compare = ["bench", "compare", str(made.suite), "--store", str(made.log.with_name("bench"))]
+    return [shlex.join([program(), *words]) for words in (review, bench, compare)]
+
+
+def program() -> str:
+    """What starts this program: ``fusion`` where a shell finds it by that name, else its path."""
+    running = Path(sys.argv[0])
+    if running.stem != "fusion":
+        running = Path(sys.executable).with_name("fusion")
+    found = shutil.which("fusion")
+    if not running.is_file() or (found is not None and os.path.samefile(found, running)):
+        return "fusion"
+    return str(running)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -29,9 +30,24 @@ def write(path: Path, content: bytes) -> None:
         return
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+        _write_whole(path.resolve(), content)
     except OSError as error:
         raise FusionError(f"{path}: cannot be written ({error.strerror}); give another place") from error
+
+
+def _write_whole(path: Path, content: bytes) -> None:
+    """Into a file beside it first: where the disk is full, what was there stays, and no half file does."""
+    if path.exists() and not path.is_file():
+        path.write_bytes(content)  # a device or a pipe, which keeps its place
+        return
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        beside.write_bytes(content)
+        if path.exists():
+            shutil.copymode(path, beside)
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def write_json(path: Path, record: object, *, indent: int | None = None) -> None:

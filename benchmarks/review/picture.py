@@ -7,10 +7,10 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-from benchmarks.output import require_place
-from benchmarks.review.viewer import PAUSE_S, go_to, require_rerun, start
+from benchmarks.output import require_place, write
+from benchmarks.review.session import Session
+from benchmarks.review.viewer import require_rerun, start
 from fusion import ViewerError
 
 SIZE = (1800, 1100)
@@ -18,8 +18,9 @@ SIZE = (1800, 1100)
 MOST_PICTURES = 6
 """Plots fill in lazily: pictures are taken until two are alike, at most this many."""
 NO_DRIVER = (
-    "the Rerun viewer cannot draw without a display here; give it a Vulkan driver, on Debian or Ubuntu by "
-    "`apt-get install --no-install-recommends libvulkan1 mesa-vulkan-drivers libudev1`, or save the review with --save"
+    "the Rerun viewer cannot draw a picture here, usually for want of a Vulkan driver; on Debian or Ubuntu "
+    "`apt-get install --no-install-recommends libvulkan1 mesa-vulkan-drivers libudev1` brings one, and a review saved "
+    "with --save opens elsewhere with `rerun`"
 )
 
 
@@ -33,40 +34,39 @@ def render(files: Sequence[Path], output: Path, *, at_s: float | None = None) ->
         if not file.is_file():
             raise ViewerError(f"{file}: no such file; write one with `fusion review RUN.mcap --save {file}`")
     require_place(output)
-    with headless_viewer(files) as client:
-        go_to(client, at_s)
-        _take_settled(client, output)
-        _check_views(client)
+    with headless_viewer(files) as session:
+        content = drawn(session, at_s)
+    write(output, content)
     return output
 
 
 @contextmanager
-def headless_viewer(files: Sequence[Path]) -> Iterator[Any]:
-    """A client of a viewer that has its own temporary folder, for it leaves files behind, and ends with the block."""
-    with tempfile.TemporaryDirectory(prefix="fusion-picture-") as folder:
+def headless_viewer(files: Sequence[Path]) -> Iterator[Session]:
+    """A viewer that has its own temporary folder, for it leaves files behind, and ends with the block."""
+    with tempfile.TemporaryDirectory(prefix="fusion-viewer-") as folder:
         words = ("--headless", "--window-size", "x".join(map(str, SIZE)), "--hide-welcome-screen")
-        environment = {"XDG_RUNTIME_DIR": folder, "TMPDIR": folder, "RUST_LOG": "error"}
-        viewer = start(files, *words, otherwise=NO_DRIVER, environment=environment)
+        viewer = start(files, *words, remedy=NO_DRIVER, environment={"XDG_RUNTIME_DIR": folder, "TMPDIR": folder})
         try:
-            yield viewer.connected()
+            yield Session.begin(viewer)
         finally:
             viewer.stop()
 
 
-def _take_settled(client: Any, output: Path) -> None:  # noqa: ANN401 - Rerun's own value
-    before = b""
-    for _ in range(MOST_PICTURES):
-        client.save_screenshot(str(output.resolve()))
-        now = output.read_bytes()
+def drawn(session: Session, at_s: float | None) -> bytes:
+    """The picture at ``at_s``, once it settles, as a PNG file; raises `ViewerError`."""
+    session.go_to(at_s)
+    content = _settled(session)
+    for name, summary in session.errors_of_views():
+        raise ViewerError(f"the view {name!r} reports: {summary}; please report this as a bug")
+    return content
+
+
+def _settled(session: Session) -> bytes:
+    before = session.screenshot()
+    for _ in range(MOST_PICTURES - 1):
+        time.sleep(5 * session.viewer.patience.pause_s)
+        now = session.screenshot()
         if now == before:
-            return
+            break
         before = now
-        time.sleep(5 * PAUSE_S)
-
-
-def _check_views(client: Any) -> None:  # noqa: ANN401
-    """Views report what they could not show."""
-    reports = [(view.name, report) for view in client.get_state().views for report in view.reports]
-    for name, report in reports:
-        if report.severity == "error":
-            raise ViewerError(f"the view {name!r} reports: {report.summary}; please report this as a bug")
+    return before

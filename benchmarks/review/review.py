@@ -5,27 +5,27 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import fusion
 from benchmarks.arguments import at_least_one, not_negative, since_start
 from benchmarks.bench import Settings, parse_settings, require_estimators, require_settings
-from benchmarks.cell import Cell, Score, score_lane
-from benchmarks.clouds import CloudWatch
-from benchmarks.lane import Lane, run_lane
+from benchmarks.cell import Score
+from benchmarks.lane import Lane
 from benchmarks.output import require_place
-from benchmarks.review.counterfactual import Counterfactual, counterfactuals, ghost_lane, require_within
+from benchmarks.review.counterfactual import counterfactuals, require_within
 from benchmarks.review.drawing import drawings
+from benchmarks.review.folding import fold
 from benchmarks.review.frame import Frame
 from benchmarks.review.listing import told
 from benchmarks.review.moments import Moment, worst_moments
 from benchmarks.review.picture import render
 from benchmarks.review.scene import SUFFIX, write_scene
 from benchmarks.review.subject import own_log, remarks, subject, subject_options, words
-from benchmarks.review.viewer import has_display, open_viewer, require_rerun, serve_web
+from benchmarks.review.viewer import require_rerun
+from benchmarks.review.window import has_display, open_viewer, serve_web
 from fusion import ParameterError, ViewerError
 from logs.run import Run
 
@@ -86,7 +86,7 @@ def review(
     if at_s is not None:
         require_within(recorded, at_s, "--at")
     chosen = {name: settings.get(name, {}) for name in names}
-    lanes, scores = _folded(recorded, chosen, counterfactuals(recorded, without, reject_s), seed)
+    lanes, scores = fold(recorded, chosen, seed, instead=counterfactuals(recorded, without, reject_s))
     files: list[Path] = []
     if save is not None or opens:
         # The viewer goes on reading after this program has ended, so its file has to stay.
@@ -97,23 +97,6 @@ def review(
     if opens:
         open_viewer(files, at_s=at_s)
     return Review(files, _worst(recorded, lanes, scores, worst) if worst else [])
-
-
-def _folded(run: Run, chosen: Settings, instead: Sequence[Counterfactual], seed: int) -> tuple[list[Lane], list[Score]]:
-    """What the estimators made of the run, and of what did not happen; each lane with its score."""
-    folds = [(run, _watched_lane(run, name, params, seed)) for name, params in chosen.items()]
-    folds += [
-        (what_if.run, ghost_lane(name, params, what_if, seed)) for what_if in instead for name, params in chosen.items()
-    ]
-    scores = [score_lane(Cell(run.path, lane.name, {}, seed), folded, lane) for folded, lane in folds]
-    return [lane for _, lane in folds], scores
-
-
-def _watched_lane(run: Run, name: str, params: Mapping[str, object], seed: int) -> Lane:
-    """A lane with the particles of an estimator that shows them."""
-    watch = CloudWatch(run)
-    lane = run_lane(run, name, params, seed, watch=watch)
-    return replace(lane, clouds=watch.clouds())
 
 
 def _worst(run: Run, lanes: Sequence[Lane], scores: Sequence[Score], count: int) -> list[Moment]:

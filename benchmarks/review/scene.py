@@ -14,6 +14,7 @@ from urllib.parse import quote
 
 from benchmarks.cell import Score
 from benchmarks.lane import Lane
+from benchmarks.output import require_place, write
 from benchmarks.review.base_layer import draw_base, properties
 from benchmarks.review.blueprint import blueprint
 from benchmarks.review.canvas import Canvas
@@ -27,7 +28,6 @@ from benchmarks.review.listing import line
 from benchmarks.review.moments import worst_moments
 from benchmarks.review.viewer import require_rerun
 from benchmarks.table import COLUMNS, Column, as_text, ranked
-from fusion import FusionError
 from logs.run import Run
 
 AGES = (Column("age_p95", "age", 1.0, 2), Column("dropouts", "gaps", 1.0, 0))
@@ -48,7 +48,7 @@ def write_scene(output: Path, run: Run, lanes: Sequence[Lane], scores: Sequence[
     frame, drawn, readings = Frame.around(run), drawings(run, lanes, scores), heard(run.world, run.measurements)
     axes, legend = _axes(drawn), frame.legend(1 + len(drawn))
     identity = f"{run.name} {run.world.hash[:12]}"
-    with _recording(base, identity, default_blueprint=blueprint(frame, run, drawn)) as recording:
+    with _recording(base, identity, blueprint(frame, run, drawn)) as recording:
         recording.send_recording_name(run.name)
         recording.send_property("run", rr.AnyValues(**properties(run, frame)))
         canvas = Canvas(rr, recording, frame.start_ns, frame.timelines)
@@ -74,21 +74,20 @@ def files(output: Path, lanes: Sequence[str]) -> tuple[Path, Mapping[str, Path]]
 
 
 @contextmanager
-def _recording(output: Path, identity: str, **sink: Any) -> Iterator[Any]:  # noqa: ANN401 - Rerun's own values
+def _recording(output: Path, identity: str, layout: Any = None) -> Iterator[Any]:  # noqa: ANN401 - Rerun's own values
     """A recording that is written into the file ``output``; the one with the layout alone carries the properties."""
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        output.touch()
-    except OSError as error:
-        raise FusionError(f"{output}: the review cannot be written ({error.strerror}); give another place") from error
+    require_place(output)
     rr = require_rerun()
-    recording = rr.RecordingStream(APPLICATION, recording_id=identity, send_properties=bool(sink))
-    recording.save(output, **sink)
+    recording = rr.RecordingStream(APPLICATION, recording_id=identity, send_properties=layout is not None)
+    # Not by Rerun's own writer, a thread that ends on a full disk and lets others wait for it for ever.
+    memory = recording.memory_recording()
+    if layout is not None:
+        recording.send_blueprint(layout, make_active=False)
     try:
         yield recording
     finally:
-        recording.flush()
-        recording.disconnect()
+        content = memory.drain_as_bytes()
+    write(output, content)
 
 
 def _axes(drawn: Sequence[Drawing]) -> CdfAxes | None:

@@ -1,4 +1,9 @@
-"""The Rerun viewer as a process of its own: found, started and spoken to; in a window or in a browser."""
+"""The Rerun viewer as a process of its own: found, started, asked, ended.
+
+It may end at any moment, fall silent, or answer nonsense: without a Vulkan driver it answers once or twice and ends.
+Its client then raises anything, or never returns. So all questions go through `Viewer.ask`, which raises one error
+alone.
+"""
 
 from __future__ import annotations
 
@@ -8,28 +13,36 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from concurrent import futures
+from contextlib import suppress
 from pathlib import Path
+from threading import Thread
 from typing import IO, Any, NamedTuple, TypeVar
-from urllib.parse import quote
-from urllib.request import urlopen
 
-import numpy as np
-
-from benchmarks.review.frame import TIMELINE
 from fusion import ViewerError
-from fusion.values import nanoseconds
 
-TIMEOUT_S = 90.0
-"""The viewer may take this long for each step on a slow, loaded machine."""
-PAUSE_S = 0.1
 LOCAL = "127.0.0.1"
 """Nobody else on the network is to see a run."""
 NO_RERUN = "Rerun is not installed; `pip install 'fusion-localization[review]'` brings it in"
-NO_VIEWER = "the Rerun viewer did not start; save the review with --save, and open it elsewhere with `rerun`"
+NO_VIEWER = "the Rerun viewer does not run here; save the review with --save, and open it elsewhere with `rerun`"
+NO_ANSWER = (
+    "the Rerun viewer does not answer as it should; try again, or save the review with --save and open it elsewhere "
+    "with `rerun`"
+)
 
 Answer = TypeVar("Answer")
+
+
+class Patience(NamedTuple):
+    """How long a viewer may take on a slow, loaded machine [s]."""
+
+    answer_s: float = 90.0
+    """For an answer; for starting or loading, too, however often it is asked meanwhile."""
+    ending_s: float = 10.0
+    """From a failure to its end: it writes down the cause first."""
+    pause_s: float = 0.1
+    """Between two questions for the same thing."""
 
 
 def require_rerun() -> Any:  # noqa: ANN401 - the module
@@ -39,11 +52,6 @@ def require_rerun() -> Any:  # noqa: ANN401 - the module
     except ImportError as error:
         raise ViewerError(f"{NO_RERUN} ({error})") from error
     return rerun
-
-
-def has_display() -> bool:
-    """Whether a window could be opened."""
-    return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def program() -> str:
@@ -56,62 +64,102 @@ def program() -> str:
 
 
 class Viewer(NamedTuple):
-    """A viewer that runs, or is about to: its process, what it said of errors, and its port on this machine."""
+    """A viewer that runs, or is about to: its process, its standard error, and its port on this machine."""
 
     process: subprocess.Popen[bytes]
     errors: IO[bytes]
     port: int
-    otherwise: str
-    """What is told, with a remedy, when it does not come up."""
+    remedy: str = NO_VIEWER
+    """What to do where it ends by itself: the start of that error's message."""
+    patience: Patience = Patience()
 
-    def connected(self) -> Any:  # noqa: ANN401 - Rerun's own value
-        """A client once the viewer answers; raises `ViewerError` when it has ended instead."""
-        return wait(self._answer, self.otherwise)
+    def ask(self, wanted: str, question: Callable[[], Answer]) -> Answer:
+        """The answer to ``question``, which asks for what is ``wanted``. Raises `ViewerError` where none comes in time,
+        or it raises anything: it checks the answer, too.
+        """
+        return self._ask(wanted, question, self.patience.answer_s)
 
-    def _answer(self) -> Any | None:  # noqa: ANN401
-        self.check()
-        from rerun.experimental import ViewerClient
+    def _ask(self, wanted: str, question: Callable[[], Answer], limit_s: float) -> Answer:
+        answer: futures.Future[Answer] = futures.Future()
+        # Not by an executor, which waits for its threads when the program ends.
+        Thread(target=_answer, args=(question, answer), daemon=True).start()
+        futures.wait([answer], limit_s)
+        if not answer.done():
+            raise self._silence(wanted)
+        if (error := answer.exception()) is not None:
+            raise self._failure(f"asked for {wanted}: {type(error).__name__}: {error}") from error
+        return answer.result()
 
-        try:
-            client = ViewerClient.connect(f"rerun+http://{LOCAL}:{self.port}/proxy")
-            client.get_state()
-        except Exception:  # noqa: BLE001 - not there yet, in any of the words gRPC has for that
+    def until(self, wanted: str, question: Callable[[], Answer | None]) -> Answer:
+        """The first answer that is not None; raises `ViewerError` as `ask` does."""
+        deadline = time.monotonic() + self.patience.answer_s
+        while (left_s := deadline - time.monotonic()) > 0.0:
+            if (ending := self._ending()) is not None:
+                raise ViewerError(ending)
+            answer = self._ask(wanted, question, left_s)
+            if answer is not None:
+                return answer
+            time.sleep(self.patience.pause_s)
+        raise self._silence(wanted)
+
+    def _silence(self, wanted: str) -> ViewerError:
+        return self._failure(f"asked for {wanted}: nothing within {self.patience.answer_s:g} s")
+
+    def _failure(self, what: str) -> ViewerError:
+        """The error to raise: that it ended if it did, for then that is the cause of the rest."""
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(self.patience.ending_s)
+        return ViewerError(self._ending() or f"{NO_ANSWER} ({what})")
+
+    def _ending(self) -> str | None:
+        """The remedy, and the cause that it has left behind; None while it runs."""
+        code = self.process.poll()
+        if code is None:
             return None
-        return client
-
-    def check(self) -> None:
-        """Raise `ViewerError` when the process has ended."""
-        if self.process.poll() is not None:
-            self.errors.seek(0)
-            # Its first line is the cause; a long trace and where to report it follow.
-            said = self.errors.read().decode(errors="replace").strip().partition("\n")[0]
-            raise ViewerError(f"{self.otherwise} (the viewer said: {said or 'nothing'})")
+        self.errors.seek(0)
+        # Its first line is the cause; a long trace and where to report it follow.
+        first = self.errors.read().decode(errors="replace").strip().partition("\n")[0]
+        ended = f"signal {-code}" if code < 0 else f"exit code {code}"
+        return f"{self.remedy} (it ended with {ended}: {first or 'no message'})"
 
     def stop(self) -> None:
         """End it."""
         self.errors.close()
         self.process.terminate()
         try:
-            self.process.wait(timeout=10.0)
+            self.process.wait(self.patience.ending_s)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
 
 
+def _answer(question: Callable[[], Answer], answer: futures.Future[Answer]) -> None:
+    try:
+        answer.set_result(question())
+    except BaseException as error:  # noqa: BLE001 - a panic of Rerun's is no Exception; interrupts are for the main thread
+        answer.set_exception(error)
+
+
 def start(
-    files: Sequence[Path], *words: str, otherwise: str = NO_VIEWER, environment: Mapping[str, str] | None = None
+    files: Sequence[Path], *words: str, remedy: str = NO_VIEWER, environment: Mapping[str, str] | None = None
 ) -> Viewer:
     """Start the viewer on Rerun files that belong together; it outlives this program unless stopped."""
     port = free_port()
+    command = [program(), *words, "--port", str(port), "--bind", LOCAL, *(str(file.resolve()) for file in files)]
     errors = tempfile.TemporaryFile()  # noqa: SIM115 - the viewer writes into it for as long as it runs
-    process = subprocess.Popen(  # noqa: S603 - no shell, our own words
-        [program(), *words, "--port", str(port), "--bind", LOCAL, *(str(file.resolve()) for file in files)],
-        env={**os.environ, **(environment or {})},
-        stdout=subprocess.DEVNULL,
-        stderr=errors,
-        start_new_session=True,
-    )
-    return Viewer(process, errors, port, otherwise)
+    try:
+        process = subprocess.Popen(  # noqa: S603 - no shell, our own words
+            command,
+            # What it writes shall begin with the cause of its end.
+            env={**os.environ, "RUST_LOG": "error", **(environment or {})},
+            stdout=subprocess.DEVNULL,
+            stderr=errors,
+            start_new_session=True,
+        )
+    except OSError as error:
+        errors.close()
+        raise ViewerError(f"{remedy} ({error})") from error
+    return Viewer(process, errors, port, remedy)
 
 
 def free_port() -> int:
@@ -119,64 +167,3 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind((LOCAL, 0))
         return int(probe.getsockname()[1])
-
-
-def wait(ask: Callable[[], Answer | None], otherwise: str) -> Answer:
-    """Ask until there is an answer; raises `ViewerError` after `TIMEOUT_S`."""
-    deadline = time.monotonic() + TIMEOUT_S
-    while time.monotonic() < deadline:
-        answer = ask()
-        if answer is not None:
-            return answer
-        time.sleep(PAUSE_S)
-    raise ViewerError(f"{otherwise} (after {TIMEOUT_S:.0f} s)")
-
-
-def go_to(client: Any, at_s: float | None) -> int:  # noqa: ANN401
-    """Wait for the recording and put the time cursor ``at_s`` after its start (None: at its end); answers it in ns."""
-
-    def loaded() -> Any | None:  # noqa: ANN401
-        state = client.get_state()
-        return state.recordings[0] if state.recordings and not state.loading else None
-
-    recording = wait(loaded, "the recording is not loaded")
-    end_ns = max((line.end or 0 for line in recording.timelines if line.name == TIMELINE), default=0)
-    at_ns = end_ns if at_s is None else min(max(nanoseconds(at_s), 0), end_ns)
-    client.set_time(TIMELINE, duration=np.timedelta64(at_ns, "ns"), play_state="paused")
-    return at_ns
-
-
-def open_viewer(files: Sequence[Path], *, at_s: float | None = None) -> None:
-    """Show Rerun files in a window that outlives this program, the time cursor at ``at_s`` (None: the end)."""
-    viewer = start(files, "--hide-welcome-screen")
-    with viewer.errors:
-        go_to(viewer.connected(), at_s)
-
-
-class Served(NamedTuple):
-    """A web viewer: where it is, and the server's process."""
-
-    address: str
-    process: subprocess.Popen[bytes]
-
-
-@contextmanager
-def serve_web(files: Sequence[Path]) -> Iterator[Served]:
-    """The web viewer on Rerun files, for browsers on this machine, as long as the block lasts."""
-    page = free_port()
-    viewer = start(files, "--serve-web", "--web-viewer-port", str(page))
-    source = quote(f"rerun+http://{LOCAL}:{viewer.port}/proxy", safe="")
-
-    def answered() -> bool | None:
-        viewer.check()
-        try:
-            with urlopen(f"http://{LOCAL}:{page}/", timeout=TIMEOUT_S):
-                return True
-        except OSError:
-            return None
-
-    try:
-        wait(answered, NO_VIEWER)
-        yield Served(f"http://{LOCAL}:{page}/?url={source}", viewer.process)
-    finally:
-        viewer.stop()

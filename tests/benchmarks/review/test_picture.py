@@ -10,7 +10,7 @@ import pytest
 from benchmarks.review import blueprint, picture, viewer
 from benchmarks.review.picture import SIZE, headless_viewer, render
 from benchmarks.review.review import review
-from benchmarks.review.viewer import go_to, has_display
+from benchmarks.review.window import has_display, open_viewer, serve_web
 from fusion import FusionError, LogError, PluginError, ViewerError
 from sensors.simulation.simulate import simulate
 
@@ -59,11 +59,12 @@ def test_pages_behind_the_first_are_drawn_without_an_error_of_a_view(log, tmp_pa
 @pytest.mark.viewer
 def test_layers_are_one_recording_and_the_cursor_goes_where_it_is_sent(log, tmp_path):
     files = review(log, estimators=["dead_reckoning", "ekf"], save=tmp_path / "layers").files
-    with excused(), headless_viewer([files[0], files[2]]) as client:
-        assert go_to(client, 4.25) == 4_250_000_000
-        recording = viewer.wait(lambda: stands_at(client, 4_250_000_000), "the cursor did not move")
-        assert go_to(client, 1e6) == recording.timelines[0].end
-        paths = viewer.wait(lambda: paths_with(client, "/map/estimate/ekf/path"), "the layer is not there")
+    with excused(), headless_viewer([files[0], files[2]]) as session:
+        assert session.go_to(4.25) == 4_250_000_000
+        until, client = session.viewer.until, session.client
+        recording = until("the cursor there", lambda: stands_at(client, 4_250_000_000))
+        assert session.go_to(1e6) == recording.timelines[0].end
+        paths = until("the layer", lambda: paths_with(client, "/map/estimate/ekf/path"))
         assert "/map/truth/path" in paths
         assert "/map/estimate/dead_reckoning/path" not in paths
 
@@ -81,7 +82,7 @@ def paths_with(client, path):
 def test_web_viewer_answers_on_this_machine_and_ends_with_the_block(log, tmp_path):
     pytest.importorskip("rerun", reason="needs the extra `review`")
     files = review(log, estimators=["dead_reckoning"], save=tmp_path / "review.rrd").files
-    with viewer.serve_web(files) as served:
+    with serve_web(files) as served:
         assert served.address.startswith("http://127.0.0.1:")
         assert b"<html" in urlopen(served.address).read()
     assert served.process.poll() is not None
@@ -107,8 +108,19 @@ def test_viewer_that_ends_at_once_is_told_with_the_remedy(tmp_path, monkeypatch)
     scene = tmp_path / "review.rrd"
     scene.write_bytes(b"")
     monkeypatch.setattr(viewer, "program", lambda: "false")
-    with pytest.raises(ViewerError, match="mesa-vulkan-drivers"):
+    with pytest.raises(ViewerError, match=r"mesa-vulkan-drivers.*it ended with exit code 1: no message"):
         render([scene], tmp_path / "review.png")
+    assert not (tmp_path / "review.png").exists()
+    with pytest.raises(ViewerError, match=r"open it elsewhere .*it ended with exit code 1: no message"):
+        open_viewer([scene])
+    with (
+        pytest.raises(ViewerError, match=r"open it elsewhere .*it ended with exit code 1: no message"),
+        serve_web([scene]),
+    ):
+        pass
+    monkeypatch.setattr(viewer, "program", lambda: str(scene))
+    with pytest.raises(ViewerError, match="Permission denied"):
+        open_viewer([scene])
 
 
 def test_picture_that_cannot_be_written_is_told(tmp_path):

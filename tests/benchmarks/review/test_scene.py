@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -358,6 +359,19 @@ def test_score_table_ranks_the_live_first_and_tells_the_crash(tmp_path):
     assert lines[2].endswith(" | 0 |")
     assert lines[3].startswith("| broken (crashed) |")
     assert "on purpose" in lines[-1]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+def test_full_disk_is_one_error(tmp_path):
+    run = run_of(tmp_path)
+    lanes, scores = scored(run, ["toy"])
+    (tmp_path / "review.rrd").symlink_to("/dev/full")
+    with pytest.raises(FusionError, match=r"review\.rrd: cannot be written \(No space left on device\)"):
+        write_scene(tmp_path / "review.rrd", run, lanes, scores)
+    (tmp_path / "layers").mkdir()
+    (tmp_path / "layers" / "toy.rrd").symlink_to("/dev/full")
+    with pytest.raises(FusionError, match=r"toy\.rrd: cannot be written \(No space left on device\)"):
+        write_scene(tmp_path / "layers", run, lanes, scores)
 
 
 def test_place_that_cannot_be_written_is_refused(tmp_path):
