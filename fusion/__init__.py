@@ -29,6 +29,7 @@ from fusion.errors import (
     LogError,
     MeasurementError,
     NotFoundError,
+    NotInstalledError,
     NotPermittedError,
     ParameterError,
     PluginError,
@@ -43,7 +44,7 @@ from fusion.errors import (
 from fusion.estimator import Estimator, ParticleEstimator, Particles, Tag, generator
 from fusion.geometry import Covariance, Pose, wrap_angle
 from fusion.motion import Increment, compose
-from fusion.plugins import build, load, names, registered
+from fusion.plugins import available, build, load, names, registered
 from fusion.sighting import Sighting, sightings
 from fusion.track import Tracker, Update, final, track
 from fusion.values import (
@@ -98,6 +99,7 @@ __all__ = [
     "MotorCommand",
     "Needs",
     "NotFoundError",
+    "NotInstalledError",
     "NotPermittedError",
     "Odometry",
     "OdometryNoise",
@@ -130,6 +132,7 @@ __all__ = [
     "WifiScan",
     "World",
     "WorldError",
+    "available",
     "build",
     "compose",
     "digest",

@@ -17,6 +17,7 @@ from benchmarks.paper.report import Report
 from benchmarks.plotting import require_matplotlib
 from benchmarks.progress import Progress, progress_bar
 from benchmarks.sheet import print_sheets
+from fusion.plugins import left_out
 
 TRIALS = 200
 
@@ -78,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
             workers=arguments.workers,
             progress=progress,
         )
-    for remark in report.remarks:
+    for remark in (*left_out(), *report.remarks):
         _tell(remark)
     print_sheets(list(report.sheets.values()))
     for path, writer in writers:

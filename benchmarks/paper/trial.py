@@ -73,7 +73,7 @@ def run_trial(task: tuple[str | Path, int]) -> Trial:
     scenario = _scenario(place)
     whole = simulated_run(scenario, seed)
     plain, aided = without_gyro(whole), with_gyro(whole, scenario.reality)
-    lanes = {name: (plain, run_lane(plain, name, seed=seed)) for name in fusion.names()}
+    lanes = {name: (plain, run_lane(plain, name, seed=seed)) for name in fusion.available()}
     lanes |= {name + GYRO: (aided, run_lane(aided, name, seed=seed)) for name in GYRO_LANES}
     brief = leg_by_leg(plain)
     return Trial(

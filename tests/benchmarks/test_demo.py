@@ -33,7 +33,7 @@ def test_demo_leaves_log_scores_review_and_report_and_outlives_a_missing_driver(
     made = demo(tmp_path / "demo", duration_s=6.0, suite=small(tmp_path), workers=1)
     assert read_run(made.log).truth is not None
     records = json.loads(made.records.read_text())
-    assert {record["estimator"] for record in records} == set(fusion.names())
+    assert {record["estimator"] for record in records} == set(fusion.available())
     assert made.scene is not None
     assert made.scene.stat().st_size > 0
     assert made.picture is None

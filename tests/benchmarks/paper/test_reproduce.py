@@ -52,7 +52,7 @@ def test_a_seed_gives_its_run_whichever_is_the_first(report):
 
 def test_every_estimator_runs_on_the_same_runs_and_some_on_a_gyro(report):
     for outcome in report.outcomes:
-        assert set(outcome.errors) == {*fusion.names(), *(name + GYRO for name in GYRO_LANES)}
+        assert set(outcome.errors) == {*fusion.available(), *(name + GYRO for name in GYRO_LANES)}
         assert {e.shape for e in outcome.errors.values()} == {(2, outcome.environment.trial_points, 2)}
         assert not outcome.crashes
 
