@@ -19,6 +19,7 @@ from benchmarks.workers import Loss, compute
 from fusion import LogError, ParameterError, World
 from fusion.errors import did_you_mean
 from fusion.options import parse_value
+from fusion.plugins import left_out
 
 POOLED = "all runs"
 LOST = "the worker process died, twice; run it alone with --workers 1 to see why"
@@ -36,12 +37,12 @@ def bench(
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> list[Score]:
-    """The score of every estimator (None: of all installed) on every run, in that order, runs first.
+    """The score of every estimator (None: of all available) on every run, in that order, runs first.
 
     Everything that can be refused is refused before any work: raises `PluginError`, `ParameterError` or `LogError`.
     ``workers`` None: one per core; 1: in this process, where alone estimators of `fusion.registered` are known.
     """
-    chosen = tuple(dict.fromkeys(fusion.names() if estimators is None else estimators))
+    chosen = tuple(dict.fromkeys(fusion.available() if estimators is None else estimators))
     check(runs, chosen, settings or {})
     cells = [Cell(path, name, dict((settings or {}).get(name, {})), seed) for path in runs for name in chosen]
     workers = min(os.cpu_count() or 1 if workers is None else workers, len(cells))
@@ -73,10 +74,9 @@ def require_log(path: Path) -> None:
 
 
 def require_estimators(estimators: Sequence[str]) -> None:
-    """Raises `PluginError` for one that is not installed."""
+    """Raises `PluginError` for one that cannot be brought in, `NotInstalledError` where its package is missing."""
     for name in estimators:
-        if name not in fusion.names():
-            fusion.load(name)
+        fusion.load(name)
 
 
 def require_settings(settings: Settings, estimators: Sequence[str], world: World) -> None:
@@ -148,7 +148,7 @@ def run(arguments: argparse.Namespace) -> int:
             workers=arguments.workers,
             progress=progress,
         )
-    for remark in remarks(scores):
+    for remark in (*(left_out() if chosen is None else ()), *remarks(scores)):
         sys.stderr.write(f"fusion bench: {remark}\n")
     if arguments.json != Path("-"):
         from benchmarks.table import print_tables

@@ -30,6 +30,7 @@ from benchmarks.runner.run_verb import run_suite
 from benchmarks.runner.store import Store
 from benchmarks.table import print_tables
 from fusion import FusionError, ViewerError
+from fusion.plugins import left_out
 from logs.run import Run
 from sensors.simulation.simulate import simulate
 
@@ -66,7 +67,7 @@ def demo(
     suite: Path = SUITE,
     workers: int | None = None,
 ) -> Demo:
-    """Simulate the office, record it, score every installed estimator on the record, and draw all that into
+    """Simulate the office, record it, score every available estimator on the record, and draw all that into
     ``folder``: ``run.mcap``, ``scores.json``, ``review.rrd``, ``review.png``, which is by matplotlib where Rerun cannot
     draw. ``duration_s`` cuts the run short. Then compare a few estimators over several runs: ``suite``, its results in
     ``bench``, as ``report.html``.
@@ -78,7 +79,7 @@ def demo(
     log = simulate(SCENARIO, folder / "run.mcap", seed=seed, duration_s=duration_s)
     _tell("running every estimator on the same record")
     scores = bench([log], seed=seed, workers=workers)
-    for remark in remarks(scores):
+    for remark in (*left_out(), *remarks(scores)):
         _tell(remark)
     records = folder / "scores.json"
     write_records(scores, records)

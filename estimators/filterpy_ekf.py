@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from importlib.util import find_spec
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
@@ -26,7 +27,6 @@ from fusion import (
     Measurement,
     Odometry,
     ParameterError,
-    PluginError,
     Pose,
     Prior,
     Ranges,
@@ -40,6 +40,10 @@ from fusion import (
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.screen import unusable
+
+if find_spec("filterpy") is None:
+    # Its import takes a second, and waits until it is used; that it is missing is known at once.
+    raise ModuleNotFoundError("No module named 'filterpy'", name="filterpy")
 
 Readings = tuple[Sighting, ...]
 
@@ -61,7 +65,6 @@ class FilterpyFilter(ABC):
     def __init__(self, world: World, *, gate_probability: float = 0.999, most_alike: float | None = None) -> None:
         if not 0.0 < gate_probability <= 1.0:
             raise ParameterError(f"filterpy: gate_probability is {gate_probability}; give a probability in (0, 1]")
-        filterpy_kalman()
         self._world = world
         self._gate = chi_square_gate(gate_probability)
         self._most_alike = require_most_alike("filterpy", most_alike)
@@ -163,12 +166,9 @@ class FilterpyEkf(FilterpyFilter):
 
 
 def filterpy_kalman() -> ModuleType:
-    """The Kalman filters of filterpy; imported when used, as it takes 0.8 s. Raises `PluginError` without it."""
-    try:
-        import filterpy.kalman
-    except ImportError as error:
-        remedy = "pip install fusion-localization[filterpy]"
-        raise PluginError(f"filterpy cannot be imported ({error}); {remedy}") from error
+    """The Kalman filters of filterpy, imported when used."""
+    import filterpy.kalman
+
     module: ModuleType = filterpy.kalman
     return module
 

@@ -29,6 +29,7 @@ from fusion.errors import (
     LogError,
     MeasurementError,
     NotFoundError,
+    NotInstalledError,
     NotPermittedError,
     ParameterError,
     PluginError,
@@ -43,7 +44,7 @@ from fusion.errors import (
 from fusion.estimator import Estimator, ParticleEstimator, Particles, Tag, generator
 from fusion.geometry import Covariance, Pose, wrap_angle
 from fusion.motion import Increment, compose
-from fusion.plugins import build, built_in_names, load, names, registered
+from fusion.plugins import available, build, built_in_names, load, names, registered
 from fusion.screen import unusable
 from fusion.sighting import Sighting, sightings
 from fusion.track import Tracker, Update, final, track
@@ -99,6 +100,7 @@ __all__ = [
     "MotorCommand",
     "Needs",
     "NotFoundError",
+    "NotInstalledError",
     "NotPermittedError",
     "Odometry",
     "OdometryNoise",
@@ -131,6 +133,7 @@ __all__ = [
     "WifiScan",
     "World",
     "WorldError",
+    "available",
     "build",
     "built_in_names",
     "compose",

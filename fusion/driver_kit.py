@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeAlias, cast
 
 from fusion.conformance import Outcome, Verdict
 from fusion.driver import BootClock, DeviceInfo, Driver, DriverSpec, FakeDevice, Found, Level, Remark, Said
-from fusion.errors import ConformanceError, DeviceLostError, DriverError, SettingError
+from fusion.errors import ConformanceError, DependencyError, DeviceLostError, DriverError, SettingError
 from fusion.plugins import SENSORS, load
 from fusion.values import Truth, seconds
 
@@ -47,19 +47,23 @@ def _promise(promise_id: str, reason: str, *, plays: bool = True) -> Callable[[C
 
 
 def run_driver_checks(name: str) -> list[Verdict]:
-    """A verdict on every promise for the installed driver ``name``; raises `PluginError` for an unknown one."""
+    """A verdict on every promise for the installed driver ``name``; raises `PluginError` for an unknown one, and
+    `DependencyError` where a package that it needs, on its fake device too, is missing.
+    """
     made = load(name, SENSORS)
     return [driver_verdict(promise, made) for promise in DRIVER_PROMISES]
 
 
 def driver_verdict(promise: DriverPromise, made: Kind) -> Verdict:
-    """What one promise comes to for one driver class."""
+    """What one promise comes to for one driver class; raises `DependencyError` for a package that is missing."""
     if promise.plays and not hasattr(made, "fake"):
         return Verdict(promise.id, promise.reason, Outcome.SKIPPED, "the driver ships no fake device: fake()")
     try:
         promise.test(made)
     except ConformanceError as broken:
         return Verdict(promise.id, promise.reason, Outcome.BROKEN, str(broken))
+    except DependencyError:
+        raise  # of the machine, not of the driver: no promise is broken
     except Exception as error:  # noqa: BLE001 - a stranger's code may fail in any way; here that is an answer
         return Verdict(promise.id, promise.reason, Outcome.BROKEN, f"it failed: {error!r}")
     return Verdict(promise.id, promise.reason, Outcome.KEPT)

@@ -2,6 +2,7 @@
 
     FusionError
     ├── PluginError       an estimator or driver could not be brought in   → install, rename, uninstall one
+    │   └── NotInstalledError  a package that it needs is missing          → the ``pip install`` that it names
     ├── ParameterError    an option has no such name or value              → correct the option
     ├── WorldError        a world description contradicts itself           → edit the world file
     ├── MeasurementError  a measurement breaks the contract                → fix the driver or the log
@@ -35,6 +36,19 @@ class FusionError(Exception):
 
 class PluginError(FusionError):
     """An estimator or driver could not be found or brought in."""
+
+
+class NotInstalledError(PluginError):
+    """The plug-in ``name`` needs a package that is missing; ``cause`` names that and the remedy, but no plug-in."""
+
+    def __init__(self, name: str, cause: str) -> None:
+        super().__init__(name, cause)
+        self.name = name
+        self.cause = cause
+
+    def __str__(self) -> str:
+        """Name and cause in one sentence."""
+        return f"{self.name}: {self.cause}"
 
 
 class ParameterError(FusionError):

@@ -8,18 +8,20 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from fusion.errors import PluginError
+from fusion.errors import NotInstalledError, PluginError
 from fusion.plugins import load, names, parameters
 
 
 def installed() -> list[dict[str, Any]]:
-    """One entry per installed estimator: name, summary, tags, parameters; or name and error."""
+    """One entry per declared estimator: name, summary, tags, parameters; or name and error."""
     return [_entry(name) for name in names()]
 
 
 def _entry(name: str) -> dict[str, Any]:
     try:
         return _description(name, load(name))
+    except NotInstalledError as error:
+        return {"name": name, "error": error.cause}
     except PluginError as error:
         return {"name": name, "error": str(error)}
     except Exception as error:  # noqa: BLE001 - a stranger's class may lack or break anything

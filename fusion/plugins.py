@@ -6,15 +6,18 @@ A plug-in distribution declares, for instance,
     my_filter = "my_package.my_module:MyFilter"
 
 `build` makes an estimator and refuses parameters it does not have. `registered` adds one for the length of a test.
+A plug-in whose package is missing is not installed: `available` leaves it out, `load` refuses it with the remedy.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from fusion.errors import FusionError, ParameterError, PluginError, did_you_mean
+from fusion.errors import FusionError, NotInstalledError, ParameterError, PluginError, did_you_mean
 from fusion.estimator import Estimator
 
 if TYPE_CHECKING:
@@ -41,7 +44,7 @@ def _entry_points(group: str) -> dict[str, list[EntryPoint]]:
 
 
 def names(group: str = ESTIMATORS) -> tuple[str, ...]:
-    """All names installed in ``group``, sorted; nothing is imported."""
+    """All names declared in ``group``, sorted, those whose package is missing among them; nothing is imported."""
     extra = _in_process if group == ESTIMATORS else ()
     return tuple(sorted({*_entry_points(group), *extra}))
 
@@ -50,10 +53,43 @@ def built_in_names() -> tuple[str, ...]:
     """The estimators of this distribution, sorted; nothing is imported."""
     found = _entry_points(ESTIMATORS)
     return tuple(sorted(name for name in found if any(_owner(claim) == DISTRIBUTION for claim in found[name])))
+def available() -> tuple[str, ...]:
+    """The names of the estimators that can be brought in here, sorted; each is imported to find out."""
+    absent = _unavailable()
+    return tuple(name for name in names() if name not in absent)
+
+
+def left_out() -> list[str]:
+    """Why `available` leaves out the other estimators, as `in_sentences`."""
+    return in_sentences(_unavailable().values())
+
+
+def _unavailable() -> dict[str, PluginError]:
+    found = {}
+    for name in names():
+        try:
+            load(name)
+        except PluginError as error:
+            found[name] = error
+    return found
+
+
+def in_sentences(errors: Iterable[PluginError]) -> list[str]:
+    """Which plug-ins are not available and why, one sentence for all that lack the same package."""
+    lacking: dict[str, list[str]] = {}
+    broken = []
+    for error in errors:
+        if isinstance(error, NotInstalledError):
+            lacking.setdefault(error.cause, []).append(error.name)
+        else:
+            broken.append(str(error))
+    return [*(str(NotInstalledError(", ".join(own), cause)) for cause, own in lacking.items()), *broken]
 
 
 def load(name: str, group: str = ESTIMATORS) -> Any:  # noqa: ANN401 - whatever the entry point names
-    """What the entry point ``name`` of ``group`` stands for; raises `PluginError` that says how to get it."""
+    """What the entry point ``name`` of ``group`` stands for; raises `PluginError` that says how to get it, and
+    `NotInstalledError` where that is to install a package.
+    """
     if group == ESTIMATORS and name in _in_process:
         return _in_process[name]
     claims = _entry_points(group).get(name, [])
@@ -75,6 +111,9 @@ def _import(entry: EntryPoint) -> Any:  # noqa: ANN401
     try:
         return entry.load()
     except ImportError as error:
+        if isinstance(error, ModuleNotFoundError) and error.name is not None and "." not in error.name:
+            # Of a package that is there but lacks a module, the name would have a dot: that is a fault of the plug-in.
+            raise NotInstalledError(entry.name, _missing(entry, error.name)) from error
         package = entry.module.partition(".")[0]
         if "is not a package" in str(error):
             remedy = f"a file {package}.py beside your script hides the package; rename it"
@@ -83,6 +122,20 @@ def _import(entry: EntryPoint) -> Any:  # noqa: ANN401
         raise PluginError(f"{entry.name!r} ({entry.value}) cannot be imported: {error}; {remedy}") from error
     except Exception as error:
         raise PluginError(f"{entry.name!r} ({entry.value}) failed while being imported: {error!r}") from error
+
+
+def _missing(entry: EntryPoint, package: str) -> str:
+    """That ``package`` is missing, and the remedy: the smallest extra of the plug-in's distribution that brings it."""
+    requires = (entry.dist.requires or []) if entry.dist is not None else []
+    matches = (re.match(r"([\w.-]+).*;.*\bextra\s*==\s*['\"]([\w.-]+)['\"]", line) for line in requires)
+    extras = [(match[1], match[2]) for match in matches if match is not None]
+    size = Counter(extra for _, extra in extras)
+    bringing = [extra for needed, extra in extras if needed.lower().replace("-", "_") == package.lower()]
+    if bringing:
+        remedy = f"pip install '{_owner(entry)}[{min(bringing, key=size.__getitem__)}]'"
+    else:
+        remedy = f"install what {_owner(entry)} needs, or uninstall that"
+    return f"not installed, the package {package} is missing; {remedy}"
 
 
 def parameters(estimator: type[Any]) -> dict[str, inspect.Parameter]:

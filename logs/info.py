@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fusion import FusionError, Measurement, Ranges, WifiScan
+from fusion.plugins import left_out
 from fusion.values import seconds
 from logs.bag import open_bag
 from logs.devices import complaints, devices, dropped, wall_clock
@@ -47,6 +48,7 @@ def describe(path: Path) -> dict[str, Any]:
         "heading_known": run.prior is not None and run.prior.heading_known,
         "estimators": {name: len(estimates) for name, estimates in run.lanes.items()},
         "usability": [verdict.record() for verdict in usability(run)],
+        "left_out": left_out(),
         "wall_clock": wall_clock(run.clocks, _start_ns(log.arrivals)),
         "devices": devices(run.remarks),
         "complaints": dict(complaints(run.remarks)),

@@ -55,6 +55,7 @@ def _log(about: Facts) -> Iterator[str]:
     yield from (f"estimates of {name}: {count}" for name, count in about["estimators"].items())
     yield "estimators that could use it, by their tags and a short replay:"
     yield from map(_usability, about["usability"])
+    yield from (f"  {absent}" for absent in about["left_out"])
 
 
 def _recording(about: Facts) -> Iterator[str]:

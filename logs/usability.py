@@ -1,4 +1,4 @@
-"""What each installed estimator could make of a run: judged by its tags, and by the Fates of a short replay.
+"""What each available estimator could make of a run: judged by its tags, and by the Fates of a short replay.
 
 Nothing is scored here. An estimator is usable where the log has the start it needs and at least one reading (for those
 that use motion alone: odometry) that enters its state.
@@ -56,10 +56,10 @@ class Usability(NamedTuple):
 
 
 def usability(run: Run) -> list[Usability]:
-    """One per installed estimator, by name."""
+    """One per available estimator, by name."""
     start = _start(run)
     excerpt = _excerpt(run.measurements)
-    return [_judge(name, run, start, excerpt) for name in fusion.names()]
+    return [_judge(name, run, start, excerpt) for name in fusion.available()]
 
 
 def _judge(name: str, run: Run, start: Prior, excerpt: Sequence[Measurement]) -> Usability:

@@ -19,6 +19,7 @@ from benchmarks.paper.report import Report
 from benchmarks.plotting import require_matplotlib
 from benchmarks.progress import Progress, progress_bar
 from benchmarks.sheet import print_sheets
+from fusion.plugins import left_out
 
 TRIALS = 200
 
@@ -95,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
             workers=arguments.workers,
             progress=progress,
         )
-    for remark in report.remarks:
+    for remark in (*left_out(), *report.remarks):
         _tell(remark)
     print_sheets(list(report.sheets.values()))
     sys.stdout.write(f"{in_words(report.judged)}\n")

@@ -74,7 +74,8 @@ def run_trial(task: tuple[str | Path, int], estimators: Sequence[str] | None = N
     paper's curves and the filter to beat are always among them.
     """
     place, seed = task
-    chosen = {*(fusion.built_in_names() if estimators is None else estimators), ODOMETRY, WIFI, PROPOSED, EKF}
+    ours = set(fusion.built_in_names()) & set(fusion.available())
+    chosen = {*(ours if estimators is None else estimators), ODOMETRY, WIFI, PROPOSED, EKF}
     scenario = _scenario(place)
     whole = simulated_run(scenario, seed)
     plain, aided = without_gyro(whole), with_gyro(whole, scenario.reality)

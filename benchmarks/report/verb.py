@@ -173,6 +173,8 @@ def _provenance(material: Material) -> Iterator[str]:
     command = shlex.join(["fusion", "bench", "run", *material.words])
     yield as_markdown(tables.provenance(material))
     yield as_markdown(tables.contestants(material))
+    if material.suite.left_out:
+        yield f"Left out: {'; '.join(material.suite.left_out)}."
     yield from _known(tables.damage(material))
     yield (
         f"fusion {fusion.__version__}, numpy {np.__version__}, Python {platform.python_version()}. Every cell is made "

@@ -27,6 +27,7 @@ from benchmarks.review.subject import own_log, remarks, subject, subject_options
 from benchmarks.review.viewer import require_rerun
 from benchmarks.review.window import has_display, open_viewer, serve_web
 from fusion import ParameterError, ViewerError
+from fusion.plugins import left_out
 from logs.run import Run
 
 NO_DISPLAY = (
@@ -57,7 +58,7 @@ def review(
     reject_s: Sequence[float] = (),
     seed: int = 0,
 ) -> Review:
-    """Run the estimators (None: all installed), with the parameters ``settings``, over ``run`` (a log of ours, or what
+    """Run the estimators (None: all available), with the parameters ``settings``, over ``run`` (a log of ours, or what
     was read from anything else) and draw them: into
     ``save`` (one file ``OUT.rrd``, or a folder of layers), into the picture ``png``, or, given neither and no
     ``worst``, in the viewer. The time cursor of picture and viewer stands ``at_s`` after the start (None: at the end).
@@ -75,7 +76,7 @@ def review(
         require_rerun()
     if png is not None:
         require_place(png)
-    names = tuple(dict.fromkeys(fusion.names() if estimators is None else estimators))
+    names = tuple(dict.fromkeys(fusion.available() if estimators is None else estimators))
     settings = settings or {}
     require_estimators(names)
     recorded = run if isinstance(run, Run) else own_log(run)
@@ -145,7 +146,7 @@ def run(arguments: argparse.Namespace) -> int:
         # The web viewer forgets the layout when a second file follows the one that brings it.
         raise ParameterError(f"--web shows one file, not a folder of layers; give --save {arguments.save}{SUFFIX}")
     settings, recorded = parse_settings(arguments.set), subject(arguments)
-    for remark in remarks(recorded):
+    for remark in (*remarks(recorded), *(left_out() if arguments.estimators is None else ())):
         sys.stderr.write(f"fusion review: {remark}\n")
     with tempfile.TemporaryDirectory(prefix=PREFIX) as folder:
         made = review(

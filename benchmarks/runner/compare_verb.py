@@ -7,9 +7,9 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from benchmarks.runner.definition import CLEAN, Suite, load_suite
+from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.plan import cells_of
-from benchmarks.runner.plan_verb import suite_options
+from benchmarks.runner.plan_verb import opened, suite_options
 from benchmarks.runner.results import (
     RANKED_BY,
     Result,
@@ -18,7 +18,6 @@ from benchmarks.runner.results import (
     require_lower_is_better,
     require_metric,
 )
-from benchmarks.runner.store import Store
 from benchmarks.sheet import Sheet, print_sheets
 from benchmarks.statistics.verdict import Comparison, Verdict
 from fusion import ParameterError, SuiteError
@@ -30,7 +29,7 @@ NOT_MEASURED = 3
 
 def stored_results(arguments: argparse.Namespace) -> tuple[Suite, list[Result]]:
     """The suite and its results; raises `SuiteError` while some are missing."""
-    suite, store = load_suite(arguments.suite), Store(arguments.store)
+    suite, store = opened(arguments)
     cells = cells_of(suite, store)
     results = read_results(cells, store)
     if len(results) < len(cells):

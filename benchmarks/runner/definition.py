@@ -13,8 +13,9 @@ from itertools import product
 from pathlib import Path
 
 from benchmarks.metrics.instants import GAP_S, MAX_AGE_S, RATE_HZ
-from fusion import SuiteError, WorldError
+from fusion import NotInstalledError, SuiteError, WorldError, load
 from fusion.errors import did_you_mean
+from fusion.plugins import in_sentences
 from fusion.schema import read_record
 
 CATALOGUE = "catalogue"
@@ -67,7 +68,8 @@ class RunSource:
 @dataclass(frozen=True, slots=True)
 class Contestant:
     """One estimator with one set of parameters. ``use`` is its installed name; ``grid`` makes one contestant of each
-    combination; ``tuned_on`` names the runs its parameters were chosen on.
+    combination; ``tuned_on`` names the runs its parameters were chosen on; ``optional``: left out where its package is
+    missing, where the suite would be refused otherwise.
     """
 
     id: str
@@ -75,6 +77,7 @@ class Contestant:
     params: Mapping[str, object] = field(default_factory=dict)
     grid: Mapping[str, Sequence[object]] = field(default_factory=dict)
     tuned_on: tuple[str, ...] = ()
+    optional: bool = False
 
     def combinations(self) -> list[Contestant]:
         """One contestant per point of the grid, which it keeps: what else was tried belongs to a result."""
@@ -132,7 +135,10 @@ class _File:
 
 @dataclass(frozen=True, slots=True)
 class Suite:
-    """A suite, checked: grids are spread out, every run knows its topics, and `CLEAN` is the first of the faults."""
+    """A suite, checked: grids are spread out, every run knows its topics, and `CLEAN` is the first of the faults.
+
+    ``left_out``: which optional estimators are not in it and why, in sentences.
+    """
 
     name: str
     seed: int
@@ -144,6 +150,7 @@ class Suite:
     faults: tuple[FaultSet, ...]
     gate: Gate
     path: Path
+    left_out: tuple[str, ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -174,7 +181,9 @@ def builtin_suites() -> dict[str, Path]:
 
 
 def load_suite(path: Path) -> Suite:
-    """The suite in a TOML file, or a built-in one by name; raises `SuiteError` that says where it is wrong."""
+    """The suite in a TOML file, or a built-in one by name; raises `SuiteError` that says where it is wrong, and
+    `PluginError` for an optional estimator that is not there for another reason than its package.
+    """
     if not path.suffix and not path.exists():
         known = builtin_suites()
         if str(path) not in known:
@@ -195,7 +204,12 @@ def load_suite(path: Path) -> Suite:
 def _checked(written: _File, path: Path) -> Suite:
     head = written.suite
     _check_parameters(written, path)
-    contestants = tuple(each for estimator in written.estimators for each in estimator.combinations())
+    absent = _absent(written.estimators)
+    present = [one for one in written.estimators if not (one.optional and one.use in absent)]
+    contestants = tuple(each for estimator in present for each in estimator.combinations())
+    left_out = in_sentences(absent.values())
+    if absent and not contestants:
+        raise SuiteError(f"{path}: estimators: none of them is installed: {'; '.join(left_out)}")
     faults = (FaultSet(CLEAN), *written.faults)
     for what, items in (("runs", written.runs), ("estimators", contestants), ("faults", faults)):
         _require_unique([item.id for item in items], f"{path}: {what}")
@@ -216,7 +230,19 @@ def _checked(written: _File, path: Path) -> Suite:
         faults,
         written.gate,
         path.resolve(),
+        tuple(left_out),
     )
+
+
+def _absent(estimators: Sequence[Contestant]) -> dict[str, NotInstalledError]:
+    """Why the optional ones that are not there are not, by the name they use."""
+    found = {}
+    for name in dict.fromkeys(estimator.use for estimator in estimators if estimator.optional):
+        try:
+            load(name)
+        except NotInstalledError as error:
+            found[name] = error
+    return found
 
 
 def _require_unique(ids: Sequence[str], where: str) -> None:

@@ -17,9 +17,9 @@ import numpy as np
 from benchmarks.arguments import at_least_one
 from benchmarks.metrics.track import Floats
 from benchmarks.runner.baseline import Baseline, Row, counterparts, read_baseline, scores
-from benchmarks.runner.definition import CLEAN, Gate, load_suite
+from benchmarks.runner.definition import CLEAN, Gate
 from benchmarks.runner.plan import cells_of
-from benchmarks.runner.plan_verb import suite_options
+from benchmarks.runner.plan_verb import opened, suite_options
 from benchmarks.runner.results import (
     ALIVE,
     MORE_IS_BETTER,
@@ -29,7 +29,6 @@ from benchmarks.runner.results import (
     require_metric,
     score_matrix,
 )
-from benchmarks.runner.store import Store
 from benchmarks.runner.verify_verb import differing
 from benchmarks.statistics.verdict import compare
 from benchmarks.workers import Limits
@@ -169,7 +168,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _findings(arguments: argparse.Namespace) -> list[Finding]:
-    suite, store = load_suite(arguments.suite), Store(arguments.store)
+    suite, store = opened(arguments)
     cells = cells_of(suite, store)
     results = read_results(cells, store)
     if len(results) < len(cells) or not results:
@@ -187,6 +186,7 @@ def _findings(arguments: argparse.Namespace) -> list[Finding]:
         Finding(Outcome.NOT_DETERMINISTIC, f"{cell}: computed again, it differs")
         for cell in differing(cells, store, arguments.verify, Limits(suite.limits.wall_s, suite.limits.rss_mb))
     ]
+    found += [Finding(Outcome.CANNOT_TELL, sentence) for sentence in suite.left_out]
     if suite.gate.inconclusive == "warn":
         found = [one._replace(outcome=Outcome.PASS) if one.outcome is Outcome.CANNOT_TELL else one for one in found]
     return found or [Finding(Outcome.NOT_MEASURED, "the suite's [gate] asks for nothing; give ratio or floor")]

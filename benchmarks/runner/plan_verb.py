@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from benchmarks.runner.definition import load_suite
+from benchmarks.runner.definition import Suite, load_suite
 from benchmarks.runner.plan import cells_of, missing
 from benchmarks.runner.refusals import refuse_impossible
 from benchmarks.runner.store import Store
@@ -26,6 +26,14 @@ def suite_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--store", type=Path, default=STORE, metavar="FOLDER", help="where results are (%(default)s)")
 
 
+def opened(arguments: argparse.Namespace) -> tuple[Suite, Store]:
+    """The suite and the store of `suite_options`; what is left out of the suite is reported on stderr."""
+    suite = load_suite(arguments.suite)
+    for sentence in suite.left_out:
+        sys.stderr.write(f"fusion bench: {sentence}\n")
+    return suite, Store(arguments.store)
+
+
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion bench plan``."""
     suite_options(parser)
@@ -34,7 +42,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Count the cells; with ``--json`` name them."""
-    suite, store = load_suite(arguments.suite), Store(arguments.store)
+    suite, store = opened(arguments)
     cells = cells_of(suite, store)
     open_cells = missing(cells, store)
     refuse_impossible(open_cells.estimates)

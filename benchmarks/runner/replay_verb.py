@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TypeVar
 
 from benchmarks.replay import write_replay
-from benchmarks.runner.definition import CLEAN, Suite, load_suite
+from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.execute import faulty_run, fold
 from benchmarks.runner.plan import Cell, cells_of
-from benchmarks.runner.plan_verb import suite_options
+from benchmarks.runner.plan_verb import opened, suite_options
 from benchmarks.runner.store import Store
 from benchmarks.runner.verify_verb import NOT_DETERMINISTIC
 from fusion import SuiteError
@@ -62,8 +62,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Replay, and compare with what is in the store. Exit code 5 when that is something else."""
-    store = Store(arguments.store)
-    suite = load_suite(arguments.suite)
+    suite, store = opened(arguments)
     cell = one_cell(suite, store, arguments.run, arguments.estimator, fault=arguments.fault, seed=arguments.seed)
     digest = replay_cell(cell, arguments.output)
     sys.stdout.write(f"{arguments.output}\n")

@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 
 from benchmarks.arguments import at_least_one
 from benchmarks.progress import Progress, progress_bar
-from benchmarks.runner.definition import Suite, load_suite
+from benchmarks.runner.definition import Suite
 from benchmarks.runner.execute import Done, execute
 from benchmarks.runner.plan import Cell, cells_of, missing, shard
-from benchmarks.runner.plan_verb import suite_options
+from benchmarks.runner.plan_verb import opened, suite_options
 from benchmarks.runner.refusals import refuse_impossible
 from benchmarks.runner.results import ALIVE, Result, leaderboard, read_results, warnings
 from benchmarks.runner.store import Store
@@ -84,7 +84,7 @@ def _shard(text: str) -> tuple[int, int]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run, print the leaderboard. Exit code 1 when no cell survived, 3 when none was measured."""
-    suite, store = load_suite(arguments.suite), Store(arguments.store)
+    suite, store = opened(arguments)
     with progress_bar("bench run") as progress:
         results = run_suite(
             suite, store, workers=arguments.workers, part=arguments.shard, dask=arguments.dask, progress=progress

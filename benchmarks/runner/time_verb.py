@@ -18,9 +18,9 @@ from benchmarks.arguments import at_least_one
 from benchmarks.metrics.track import Floats
 from benchmarks.output import write_json
 from benchmarks.prior import starting_prior
-from benchmarks.runner.definition import Contestant, RunSource, Suite, load_suite
+from benchmarks.runner.definition import Contestant, RunSource, Suite
 from benchmarks.runner.execute import LOST
-from benchmarks.runner.plan_verb import suite_options
+from benchmarks.runner.plan_verb import opened, suite_options
 from benchmarks.runner.source import open_run
 from benchmarks.sheet import Sheet, print_sheets
 from benchmarks.worker_process import peak_rss_bytes
@@ -136,11 +136,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, keep beside the store, print. Exit code 1 when no contestant has a time."""
-    found = list(measure(load_suite(arguments.suite), arguments.repeats))
+    suite, store = opened(arguments)
+    found = list(measure(suite, arguments.repeats))
     timings = sorted((one for one in found if isinstance(one, Timing)), key=lambda timing: timing.least_us)
     untimed = [one for one in found if isinstance(one, Untimed)]
     rows = {"timings": [one._asdict() for one in timings], "untimed": [one._asdict() for one in untimed]}
-    write_json(arguments.store / TIMING_FILE, {"machine": machine(), **rows})
+    write_json(store.folder / TIMING_FILE, {"machine": machine(), **rows})
     for one in untimed:
         sys.stderr.write(f"fusion bench time: {one.contestant} has no time: {one.why}\n")
     head = ("µs per measurement", "least", "q25", "q75", "p50", "p95", "p99", "max", "CPU s per log s", "peak MB")

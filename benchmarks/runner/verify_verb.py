@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.arguments import at_least_one
-from benchmarks.runner.definition import load_suite
 from benchmarks.runner.execute import execute
 from benchmarks.runner.plan import Cell, cells_of
-from benchmarks.runner.plan_verb import suite_options
+from benchmarks.runner.plan_verb import opened, suite_options
 from benchmarks.runner.store import Store
 from benchmarks.workers import Limits, Loss
 
@@ -61,7 +60,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Name the cells that differ. Exit code 5 when some do, 3 when none is there to compare."""
-    suite, store = load_suite(arguments.suite), Store(arguments.store)
+    suite, store = opened(arguments)
     cells = cells_of(suite, store)
     if not any(_is_pure(cell, store) for cell in cells):
         sys.stderr.write("fusion bench verify: no cell is there that ended by itself; run the suite first\n")

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from fusion import (
     Estimate,
     Fate,
     LogError,
+    NotInstalledError,
     Odometry,
     ParameterError,
     PluginError,
@@ -246,6 +248,17 @@ def test_what_is_misspelt_is_refused_before_any_work(tmp_path):
         bench([tmp_path / "nothing.mcap"], estimators=["toy_wheels"])
     with pytest.raises(ParameterError, match=r"ESTIMATOR\.PARAMETER=VALUE"):
         parse_settings(["gate=0.99"])
+
+
+def test_estimator_that_is_not_installed_is_left_out_and_refused_by_name(stranger, tmp_path, capsys):
+    path = write_run(tmp_path / "run.mcap")
+    with pytest.raises(NotInstalledError, match=re.escape(f"lacking_two: {stranger}")):
+        bench([path], estimators=["dead_reckoning", "lacking_two"], workers=1)
+    assert main(["bench", str(path), "--workers", "1", "--json", "-"]) == 0
+    told = capsys.readouterr()
+    assert told.err.startswith(f"fusion bench: lacking_one, lacking_two: {stranger}\n")
+    assert told.err.count("no_such_package") == 1
+    assert {row["estimator"] for row in json.loads(told.out)} == {*fusion.names()} - {"lacking_one", "lacking_two"}
 
 
 def test_same_cell_twice_gives_the_same_digest(tmp_path):

@@ -43,7 +43,7 @@ def test_demo_leaves_log_scores_review_picture_and_report_where_rerun_cannot_dra
     made = demo(tmp_path / "demo", duration_s=6.0, suite=small(tmp_path), workers=1)
     assert read_run(made.log).truth is not None
     records = json.loads(made.records.read_text())
-    assert {record["estimator"] for record in records} == set(fusion.names())
+    assert {record["estimator"] for record in records} == set(fusion.available())
     assert made.drawn.scene.stat().st_size > 0
     assert made.drawn.picture.read_bytes().startswith(b"\x89PNG")
     assert not made.drawn.rendered

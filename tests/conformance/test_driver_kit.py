@@ -1,5 +1,6 @@
 """The kit of drivers finds a driver out that breaks a promise: one spoilt on purpose for each."""
 
+import sys
 from dataclasses import replace
 
 import pytest
@@ -144,3 +145,11 @@ def test_the_command_checks_a_driver_by_name(capsys):
     assert "14 promises kept, 0 broken" in capsys.readouterr().out
     assert main(["check", "--driver", "simulated_gyros"]) == 1
     assert "did you mean 'simulated_gyro'" in capsys.readouterr().err
+
+
+def test_driver_whose_package_is_missing_breaks_no_promise_and_says_so_once(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "serialx", None)
+    assert main(["check", "--driver", "uwb_qm33"]) == 1
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.startswith("fusion check: the package serialx is missing; python3 -m pip install")

@@ -1,7 +1,6 @@
 """filterpy's filters behind our contract, against our own filter, the exact Kalman filter, and each other."""
 
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from fusion import (
     Decision,
     Odometry,
     ParameterError,
-    PluginError,
     Pose,
     Prior,
     RangeReading,
@@ -147,13 +145,6 @@ def test_same_input_gives_the_same_bytes(name):
     measurements, _ = drive(seconds=5)
     one, two = (digest(radio_updates(build(name, world()), world(), measurements, prior())) for _ in range(2))
     assert one == two
-
-
-@BOTH
-def test_missing_filterpy_is_told_with_the_remedy(name, monkeypatch):
-    monkeypatch.setitem(sys.modules, "filterpy.kalman", None)
-    with pytest.raises(PluginError, match=r"pip install fusion-localization\[filterpy\]"):
-        build(name, world())
 
 
 @BOTH

@@ -3,12 +3,16 @@
 import argparse
 import importlib.metadata
 import json
+import pickle
+import sys
 from importlib.metadata import EntryPoint
 
 import pytest
 
 import fusion
-from fusion import PluginError, listing
+from fusion import NotInstalledError, PluginError, listing
+from fusion.cli import main
+from fusion.plugins import left_out
 
 GROUP = "fusion.estimators"
 
@@ -31,10 +35,50 @@ def test_name_claimed_twice_names_both(installed):
         fusion.load("ekf")
 
 
-def test_plugin_whose_package_is_missing_says_what_to_install(installed):
+def test_plugin_whose_own_package_is_missing_is_not_installed(installed):
     installed(("lost", "no_such_package.filters:Lost"))
-    with pytest.raises(PluginError, match=r"'lost' .*cannot be imported: No module named 'no_such_package'.*install"):
+    with pytest.raises(NotInstalledError, match="lost: not installed, the package no_such_package is missing; install"):
         fusion.load("lost")
+
+
+def test_remedy_is_the_smallest_extra_that_brings_the_missing_package(stranger):
+    with pytest.raises(NotInstalledError) as caught:
+        fusion.load("lacking_one")
+    assert str(caught.value) == f"lacking_one: {stranger}"
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["filterpy_ekf", "filterpy_ukf"])
+def test_missing_filterpy_is_named_with_the_extra_that_brings_it(name, monkeypatch):
+    monkeypatch.setitem(sys.modules, "filterpy", None)
+    for module in ("estimators.filterpy_ekf", "estimators.filterpy_ukf"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
+    with pytest.raises(NotInstalledError, match=r"pip install 'fusion-localization\[filterpy\]'"):
+        fusion.load(name)
+
+
+@pytest.mark.parametrize("module", ["fusion.no_such_module", "json.no_such_module"])
+def test_plugin_that_misses_a_module_of_a_package_that_is_there_is_broken(installed, module):
+    installed(("wrong", f"{module}:Wrong"))
+    with pytest.raises(PluginError, match=r"'wrong' .*cannot be imported") as caught:
+        fusion.load("wrong")
+    assert not isinstance(caught.value, NotInstalledError)
+
+
+def test_what_is_not_available_is_left_out_and_reported_once_for_each_cause(stranger, monkeypatch, tmp_path):
+    (tmp_path / "site" / "lacking.py").with_name("broken.py").write_text("1 / 0\n", encoding="utf-8")
+    with (tmp_path / "site" / "stranger-1.dist-info" / "entry_points.txt").open("a", encoding="utf-8") as entries:
+        entries.write("broken = broken:Broken\n")
+    assert {"lacking_one", "lacking_two", "broken"} <= set(fusion.names())
+    assert set(fusion.available()) == set(fusion.names()) - {"lacking_one", "lacking_two", "broken"}
+    lacking, broken = left_out()
+    assert lacking == f"lacking_one, lacking_two: {stranger}"
+    assert "'broken' (broken:Broken) failed while being imported: ZeroDivisionError" in broken
+
+
+def test_check_of_what_is_not_installed_is_one_sentence(stranger, capsys):
+    assert main(["check", "lacking_one"]) == 1
+    assert capsys.readouterr() == ("", f"fusion check: lacking_one: {stranger}\n")
 
 
 def test_module_that_hides_a_package_is_told_to_be_renamed(installed):

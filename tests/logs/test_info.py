@@ -203,9 +203,16 @@ def verdicts(path):
 
 def test_every_installed_estimator_can_use_a_full_log(tmp_path):
     rows = verdicts(drive(tmp_path / "run.mcap"))
-    assert tuple(rows) == fusion.names()
+    assert tuple(rows) == fusion.available()
     assert {name for name, row in rows.items() if not row["usable"]} == set()
     assert (rows["ekf"]["readings"], rows["ekf"]["used"]) == (18, 18)
+
+
+def test_estimator_that_is_not_installed_is_reported_once(stranger, tmp_path, capsys):
+    path = drive(tmp_path / "run.mcap")
+    assert {"lacking_one", "lacking_two"}.isdisjoint(verdicts(path))
+    assert main(["info", str(path)]) == 0
+    assert f"  lacking_one, lacking_two: {stranger}\n" in capsys.readouterr().out
 
 
 def test_what_is_missing_is_named_estimator_by_estimator(tmp_path, capsys):

@@ -1,6 +1,7 @@
 """The suites that come with the package, and the catalogue of the recordings that do not."""
 
 import hashlib
+import sys
 import tomllib
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from benchmarks.runner import definition
 from benchmarks.runner.definition import builtin_suites, load_suite
 from benchmarks.runner.plan import contestant_spec, read_faults
 from fusion import SuiteError
+from fusion.cli import main
 from logs.importing import KINDS
 from sensors.simulation.scenario import builtin_names
 
@@ -35,6 +37,77 @@ def test_built_in_suites_go_by_name_and_a_near_miss_is_answered():
     assert load_suite(Path("quick")) == load_suite(SUITES / "quick.toml")
     with pytest.raises(SuiteError, match="did you mean 'quick'"):
         load_suite(Path("quikc"))
+
+
+OPTIONAL = """
+[suite]
+name = "optional"
+[[runs]]
+id = "office"
+scenario = "office"
+duration_s = 6.0
+[[estimators]]
+id = "wheels"
+use = "dead_reckoning"
+[[estimators]]
+id = "theirs"
+use = "lacking_one"
+optional = true
+[gate]
+floor = { availability = 0.5 }
+"""
+
+
+@pytest.fixture
+def optional(stranger, tmp_path):
+    """Suite and store on a command line; one of its estimators is optional, and not installed."""
+    (tmp_path / "optional.toml").write_text(OPTIONAL, encoding="utf-8")
+    return [str(tmp_path / "optional.toml"), "--store", str(tmp_path / "store")]
+
+
+def test_optional_estimator_that_is_not_installed_is_left_out_with_the_remedy(optional, stranger, tmp_path, capsys):
+    assert main(["bench", "run", *optional, "-j", "1"]) == 0
+    told = capsys.readouterr()
+    assert told.err == f"fusion bench: lacking_one: {stranger}\nfusion bench run: 1 ok\n"
+    assert "wheels" in told.out
+    assert "theirs" not in told.out
+    page = tmp_path / "page.md"
+    assert main(["bench", "report", *optional, "--markdown", str(page)]) == 0
+    assert f"Left out: lacking_one: {stranger}." in page.read_text(encoding="utf-8")
+
+
+def test_gate_cannot_tell_of_an_estimator_that_is_left_out(optional, stranger, tmp_path, capsys):
+    assert main(["bench", "run", *optional, "-j", "1"]) == 0
+    assert main(["bench", "gate", *optional]) == 4
+    assert f"cannot tell: lacking_one: {stranger}" in capsys.readouterr().out
+    path = Path(optional[0])
+    path.write_text(OPTIONAL + 'inconclusive = "warn"\n', encoding="utf-8")
+    assert main(["bench", "gate", *optional]) == 0
+
+
+def test_suite_that_needs_what_is_not_installed_is_refused_by_name(optional, stranger, capsys):
+    path = Path(optional[0])
+    for text in (
+        OPTIONAL.replace("optional = true", ""),
+        OPTIONAL.replace('use = "dead_reckoning"', 'use = "lacking_one"'),
+    ):
+        path.write_text(text, encoding="utf-8")
+        assert main(["bench", "run", *optional]) == 1
+        assert f"fusion bench run: lacking_one: {stranger}" in capsys.readouterr().err
+    path.write_text(OPTIONAL.replace('id = "wheels"\nuse = "dead_reckoning"\n[[estimators]]\n', ""), encoding="utf-8")
+    assert main(["bench", "run", *optional]) == 1
+    assert f"none of them is installed: lacking_one: {stranger}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["quick", "paper", "synthetic", "real"])
+def test_built_in_suite_does_without_packages_that_a_base_install_lacks(name, monkeypatch):
+    monkeypatch.setitem(sys.modules, "filterpy", None)
+    for module in ("estimators.filterpy_ekf", "estimators.filterpy_ukf"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
+    suite = load_suite(Path(name))
+    assert not [one.use for one in suite.contestants if one.use.startswith("filterpy")]
+    for contestant in suite.contestants:
+        contestant_spec(contestant)
 
 
 def test_suites_have_enough_runs_for_a_verdict():
