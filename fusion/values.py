@@ -120,12 +120,25 @@ Measurement: TypeAlias = WheelTicks | MotorCommand | Odometry | Gyro | WifiScan 
 
 
 class Truth(NamedTuple):
-    """Where the robot really was: a stream of its own that no estimator ever sees. Heading None when not known."""
+    """Where the robot really was: a stream of its own that no estimator ever sees.
+
+    A heading that is None or not finite is not known, nor is a position of which a coordinate is not finite.
+    """
 
     time_ns: int
     x: float
     y: float
     heading: float | None = None
+
+    @property
+    def position_known(self) -> bool:
+        """Whether it has a position."""
+        return math.isfinite(self.x) and math.isfinite(self.y)
+
+    @property
+    def known_heading(self) -> float | None:
+        """The heading [rad], None where it is not known."""
+        return None if self.heading is None or not math.isfinite(self.heading) else self.heading
 
 
 @dataclass(frozen=True, slots=True)
