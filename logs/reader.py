@@ -142,7 +142,8 @@ def _warnings(path: Path, contents: _Contents, world: World) -> tuple[str, ...]:
     found = []
     if contents.record.get("world_hash", world.hash) != world.hash:
         found.append(f"{path}: the world stored in it is not the one it was written with; its hash differs")
-    found += [f"{path}: {sentence}" for sentence in (*contents.refused, *left_out(contents.truths))]
+    uncounted = left_out([truth.position_known for truth in contents.truths])
+    found += [f"{path}: {sentence}" for sentence in (*contents.refused, *uncounted)]
     found += [f"{path}: {count} messages of {topic} cannot be decoded" for topic, count in contents.unreadable.items()]
     found += [f"{path}: {count} messages of {topic} are of no use here" for topic, count in contents.foreign.items()]
     if not contents.measurements:

@@ -51,7 +51,8 @@ class Recording:
     @property
     def doubts(self) -> list[str]:
         """The warnings, and how many true poses have no position."""
-        return [*self.warnings, *(f"{self.name}: {sentence}" for sentence in left_out(self.truths))]
+        uncounted = left_out([truth.position_known for truth in self.truths])
+        return [*self.warnings, *(f"{self.name}: {sentence}" for sentence in uncounted)]
 
     def write(self, path: Path) -> Path:
         """Write it as a log, in the order of arrival."""

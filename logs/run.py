@@ -26,6 +26,10 @@ class TruthTrack:
     def __len__(self) -> int:
         return len(self.time_ns)
 
+    def at(self, rows: NDArray[np.bool_]) -> TruthTrack:
+        """Some of it, by mask."""
+        return TruthTrack(self.time_ns[rows], self.x[rows], self.y[rows], self.heading[rows])
+
     @classmethod
     def from_truths(cls, truths: Sequence[Truth]) -> TruthTrack:
         """Columns, read-only, from single truths: those with a position; of two at one time the first counts."""
@@ -39,14 +43,16 @@ class TruthTrack:
         return cls(time_ns, x, y, heading)
 
 
-def left_out(truths: Sequence[Truth]) -> list[str]:
-    """A sentence that counts the true poses without a position, which no track holds; none where all have one."""
-    missing = sum(not truth.position_known for truth in truths)
+def left_out(placed: Sequence[bool]) -> list[str]:
+    """A sentence that counts the true poses without a position, which no track holds; none where all have one.
+    ``placed``: whether each has.
+    """
+    missing = len(placed) - sum(placed)
     if not missing:
         return []
-    if missing == len(truths):
+    if missing == len(placed):
         return [f"none of the {missing} true poses has a position, so there is no ground truth"]
-    return [f"{missing} of {len(truths)} true poses have no position, and are left out"]
+    return [f"{missing} of {len(placed)} true poses have no position, and are left out"]
 
 
 @dataclass(frozen=True, slots=True)
