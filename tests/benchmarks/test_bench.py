@@ -2,6 +2,7 @@
 
 import json
 import math
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 import fusion
 from benchmarks.bench import bench, parse_settings, pooled, remarks, write_records
-from benchmarks.cell import Score
+from benchmarks.cell import Cell, Score, score_lane
 from benchmarks.lane import run_lane
 from benchmarks.prior import starting_prior
 from benchmarks.table import print_tables, ranked
@@ -155,6 +156,15 @@ def test_log_without_truth_says_so_and_reports_the_rest(tmp_path, capsys):
     assert [remark for remark in remarks(scores) if "no ground truth" in remark]
     print_tables(scores, pooled(scores))
     assert "toy_wheels" in capsys.readouterr().out
+
+
+def test_true_heading_that_is_known_in_part_is_told_with_its_number():
+    heading = np.where(np.arange(60) < 45, 0.0, np.nan)
+    run = run_in_memory(truth=TruthTrack(np.arange(60) * TENTH_NS, np.arange(60) * 0.1, np.zeros(60), heading))
+    score = score_lane(Cell(Path("run.mcap"), "toy_wheels", {}, 0), run, run_lane(run, "toy_wheels"))
+    (remark,) = remarks([score])
+    assert remark == "run: the true heading is known at 45 of 60 instants, and heading errors are of these alone"
+    assert score.record()["head_n"] == 45.0
 
 
 def test_pooled_figures_take_all_instants_of_all_runs(tmp_path):
