@@ -161,11 +161,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 def remarks(scores: Sequence[Score]) -> list[str]:
     """What the tables cannot say: logs without truth, warnings of logs, why an estimator crashed."""
+    from benchmarks.table import partly_headed
+
     told: list[str] = []
     for score in scores:
         warnings = score.facts["warnings"]
         if isinstance(warnings, list):
             told += [f"{score.run}: {warning}" for warning in warnings]
+        if sentence := partly_headed(score.metrics):
+            told.append(f"{score.run}: {sentence}")
         if score.errors is None:
             told.append(f"{score.run} holds no ground truth: no errors are scored, only NIS, availability and time")
         if score.error is not None:

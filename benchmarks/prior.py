@@ -13,13 +13,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from fusion import Bounds, Covariance, Measurement, Odometry, Pose, Prior
+from fusion.belief import UNKNOWN_HEADING_STD
 from logs.run import Run
 
 POSITION_STD_M = 0.1
 """How well a pose taken from the truth is said to be known: set down by hand, not to the millimetre."""
 HEADING_STD_RAD = 0.05
-UNKNOWN_HEADING_STD_RAD = math.pi / math.sqrt(3.0)
-"""Standard deviation of a uniform heading."""
 
 
 def starting_prior(run: Run) -> Prior:
@@ -45,7 +44,7 @@ def _from_truth(run: Run, start_ns: int) -> Prior | None:
     first = int(before[-1] if len(before) else known[0])
     heading = float(run.truth.heading[first])
     is_known = math.isfinite(heading)
-    heading_std = HEADING_STD_RAD if is_known else UNKNOWN_HEADING_STD_RAD
+    heading_std = HEADING_STD_RAD if is_known else UNKNOWN_HEADING_STD
     return Prior(
         int(run.truth.time_ns[first]),
         Pose(float(run.truth.x[first]), float(run.truth.y[first]), heading if is_known else 0.0),
@@ -59,7 +58,7 @@ def _unknown(floor: Bounds, start_ns: int) -> Prior:
     return Prior(
         start_ns,
         Pose(floor.x_min + 0.5 * width_m, floor.y_min + 0.5 * depth_m, 0.0),
-        Covariance.from_std(width_m / math.sqrt(12.0), depth_m / math.sqrt(12.0), UNKNOWN_HEADING_STD_RAD),
+        Covariance.from_std(width_m / math.sqrt(12.0), depth_m / math.sqrt(12.0), UNKNOWN_HEADING_STD),
         position_known=False,
         heading_known=False,
     )

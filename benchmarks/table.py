@@ -66,6 +66,14 @@ def unit_of(metric: str) -> Unit:
     return Unit(math.degrees(1.0), "°") if metric.startswith("head_") else Unit(1.0, "")
 
 
+def partly_headed(metrics: Mapping[str, float]) -> str:
+    """A sentence where the true heading is known at some instants only; else ""."""
+    count, headed = metrics.get("n", math.nan), metrics.get("head_n", math.nan)
+    if not 0.0 < headed < count:
+        return ""
+    return f"the true heading is known at {headed:.0f} of {count:.0f} instants, and heading errors are of these alone"
+
+
 def ranked(scores: Sequence[Score]) -> list[Score]:
     """The best first: by status, then by the third quartile of the position error, infinite last."""
 

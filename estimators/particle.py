@@ -44,7 +44,7 @@ from fusion import (
     generator,
     sightings,
 )
-from fusion.belief import HEADING_KNOWN_STD
+from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.screen import unusable
 
 KERNEL = 0.1
@@ -104,7 +104,8 @@ class Particle:
         random = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed)))
         noise, bounds = self._world.robot.noise, self._world.bounds
         cloud = random.standard_normal((6, self._count))
-        cloud[:3] = np.array(prior.pose)[:, None] + square_root(np.array(prior.covariance.matrix)) @ cloud[:3]
+        pose, covariance = starting_belief(self._world, prior)
+        cloud[:3] = np.array(pose)[:, None] + square_root(np.array(covariance.matrix)) @ cloud[:3]
         calibration = np.array([noise.distance_scale_std, noise.turn_scale_std, noise.turn_bias_std_rad_s])
         cloud[3:] *= calibration[:, None]
         if not prior.position_known:

@@ -20,6 +20,7 @@ from fusion.driver import (
     VirtualClock,
 )
 from fusion.errors import (
+    BeliefError,
     BusyError,
     ConformanceError,
     DependencyError,
@@ -72,6 +73,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Advice",
     "Anchor",
+    "BeliefError",
     "BootClock",
     "Bounds",
     "BusyError",

@@ -10,6 +10,8 @@ from fusion.world import World
 
 HEADING_KNOWN_STD = 0.5
 """A heading counts as known while its standard deviation is below this [rad]."""
+UNKNOWN_HEADING_STD = math.pi / math.sqrt(3.0)
+"""Standard deviation of a uniform heading [rad]."""
 
 
 def starting_belief(world: World, prior: Prior) -> tuple[Pose, Covariance]:

@@ -6,6 +6,7 @@
     ├── ParameterError    an option has no such name or value              → correct the option
     ├── WorldError        a world description contradicts itself           → edit the world file
     ├── MeasurementError  a measurement breaks the contract                → fix the driver or the log
+    ├── BeliefError       a pose with its covariance cannot be believed    → correct the number it names
     ├── LogError          a file cannot be read as a run                   → repair it, or give another file
     ├── RecordingError    a foreign recording cannot be imported           → compare the folder with the docs
     ├── SuiteError        a suite of benchmarks contradicts itself         → edit the suite file
@@ -61,6 +62,10 @@ class WorldError(FusionError):
 
 class MeasurementError(FusionError):
     """A measurement breaks the contract: its shape, its unit or its time."""
+
+
+class BeliefError(FusionError):
+    """A pose is not finite, or its covariance is none: not finite, not symmetric or not positive semi-definite."""
 
 
 class LogError(FusionError):

@@ -8,7 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import combinations, combinations_with_replacement
 from typing import NamedTuple
+
+from fusion.errors import BeliefError
+
+ROUNDING = 1e-6
+"""Share of the standard deviations of two quantities by which rounding may spoil their covariance."""
 
 
 def wrap_angle(angle: float) -> float:
@@ -69,7 +75,11 @@ class Covariance(NamedTuple):
 
     @classmethod
     def from_matrix(cls, p: Sequence[Sequence[float]]) -> Covariance:
-        """From the rows of a symmetric (3, 3) of plain numbers; what is below the diagonal is not read."""
+        """From the rows of a (3, 3) of plain numbers; raises `BeliefError` where it is not symmetric but for rounding,
+        which the upper half decides.
+        """
+        if (p[0][1], p[0][2], p[1][2]) != (p[1][0], p[2][0], p[2][1]):
+            _require_symmetric(p)
         return cls(p[0][0], p[0][1], p[0][2], p[1][1], p[1][2], p[2][2])
 
     @property
@@ -81,6 +91,33 @@ class Covariance(NamedTuple):
             (self.xh, self.yh, self.hh),
         )
 
+    def flaw(self, known: tuple[bool, bool, bool] = (True, True, True)) -> str:
+        """Why this is no covariance of those of (x, y, heading) that are ``known``; "" where it is one.
+
+        A matrix is positive semi-definite when no principal minor is negative. They are those of the correlations
+        here, which have no unit, so that one bound on rounding fits all.
+        """
+        names, p = Pose._fields, self.matrix
+        chosen = [axis for axis in range(3) if known[axis]]
+        for i, j in combinations_with_replacement(chosen, 2):
+            if not math.isfinite(p[i][j]):
+                what = f"variance of {names[i]}" if i == j else f"covariance of {names[i]} and {names[j]}"
+                return f"the {what} is {p[i][j]}, no finite number"
+        for i in chosen:
+            if p[i][i] < 0.0:
+                return f"the variance of {names[i]} is {p[i][i]:g}, below zero"
+        correlations = []
+        for i, j in combinations(chosen, 2):
+            most = math.sqrt(p[i][i]) * math.sqrt(p[j][j])
+            if abs(p[i][j]) > (1.0 + ROUNDING) * most:
+                return f"{names[i]} and {names[j]} have a covariance of {p[i][j]:g}, and their variances allow {most:g}"
+            correlations.append(p[i][j] / most if most else 0.0)
+        if len(correlations) == 3:
+            xy, xh, yh = correlations
+            if 1.0 + 2.0 * xy * xh * yh - xy * xy - xh * xh - yh * yh < -ROUNDING:
+                return f"correlations of {xy:g} (x, y), {xh:g} (x, heading), {yh:g} (y, heading) exclude each other"
+        return ""
+
     @property
     def ellipse(self) -> Ellipse:
         """The ellipse of the position: roots of the eigenvalues of [[xx, xy], [xy, yy]], in closed form.
@@ -91,3 +128,12 @@ class Covariance(NamedTuple):
         middle, half = 0.5 * (self.xx + self.yy), math.hypot(0.5 * (self.xx - self.yy), self.xy)
         angle = 0.5 * math.atan2(2.0 * self.xy, self.xx - self.yy)
         return Ellipse(math.sqrt(max(middle + half, 0.0)), math.sqrt(max(middle - half, 0.0)), angle)
+
+
+def _require_symmetric(p: Sequence[Sequence[float]]) -> None:
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        if abs(p[i][j] - p[j][i]) > ROUNDING * math.sqrt(abs(p[i][i] * p[j][j])):
+            raise BeliefError(
+                f"covariance: row {i + 1}, column {j + 1} is {p[i][j]:g}, and across the diagonal {p[j][i]:g}; "
+                "a covariance is symmetric, correct one of them"
+            )

@@ -53,6 +53,8 @@ def built_in_names() -> tuple[str, ...]:
     """The estimators of this distribution, sorted; nothing is imported."""
     found = _entry_points(ESTIMATORS)
     return tuple(sorted(name for name in found if any(_owner(claim) == DISTRIBUTION for claim in found[name])))
+
+
 def available() -> tuple[str, ...]:
     """The names of the estimators that can be brought in here, sorted; each is imported to find out."""
     absent = _unavailable()

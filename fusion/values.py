@@ -6,10 +6,13 @@ measurement was true. ``sensor`` and ``seq`` identify it: the pair is unique wit
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum, unique
+from numbers import Real
 from typing import NamedTuple, TypeAlias
 
+from fusion.errors import BeliefError
 from fusion.geometry import Covariance, Pose
 
 NANOSECONDS = 1_000_000_000
@@ -117,23 +120,49 @@ Measurement: TypeAlias = WheelTicks | MotorCommand | Odometry | Gyro | WifiScan 
 
 
 class Truth(NamedTuple):
-    """Where the robot really was: a stream of its own that no estimator ever sees. Heading None when not known."""
+    """Where the robot really was: a stream of its own that no estimator ever sees.
+
+    A heading that is None or not finite is not known, nor is a position of which a coordinate is not finite.
+    """
 
     time_ns: int
     x: float
     y: float
     heading: float | None = None
 
+    @property
+    def position_known(self) -> bool:
+        """Whether it has a position."""
+        return math.isfinite(self.x) and math.isfinite(self.y)
+
+    @property
+    def known_heading(self) -> float | None:
+        """The heading [rad], None where it is not known."""
+        return None if self.heading is None or not math.isfinite(self.heading) else self.heading
+
 
 @dataclass(frozen=True, slots=True)
 class Prior:
-    """What is known before the first measurement. What is not known counts as uniform, whatever the number says."""
+    """What is known before the first measurement. What is not known counts as uniform, whatever its numbers: they may
+    be NaN. Raises `BeliefError` where the others are not finite, or no covariance.
+    """
 
     time_ns: int
     pose: Pose
     covariance: Covariance
     position_known: bool = True
     heading_known: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.covariance, Covariance):
+            raise BeliefError(f"prior: {self.covariance!r} is no fusion.Covariance; Covariance.from_matrix makes one")
+        known = (self.position_known, self.position_known, self.heading_known)
+        for name, number, is_known in zip(Pose._fields, self.pose, known, strict=True):
+            if is_known and not (isinstance(number, Real) and math.isfinite(number)):
+                remedy = "heading_known=False" if name == "heading" else "position_known=False"
+                raise BeliefError(f"prior: {name} is {number}, no finite number; give {remedy} where it is not known")
+        if flaw := self.covariance.flaw(known):
+            raise BeliefError(f"prior: {flaw}; give a finite, symmetric and positive semi-definite covariance")
 
 
 class Estimate(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Iterator
 from itertools import groupby, pairwise
@@ -104,13 +105,14 @@ def _rssi(folder: Path) -> list[WifiScan]:
 
 
 def _truth(folder: Path) -> list[Truth]:
-    rows = _rows(folder, "truth.csv", "time_s", "x_m", "y_m")
+    """Every row, also where no position is known: the log keeps it, and whoever reads it counts it."""
     return [
-        Truth(
-            row.time_ns("time_s"),
-            row.number("x_m"),
-            row.number("y_m"),
-            row.number("heading_rad") if row.text("heading_rad") else None,
-        )
-        for row in rows
+        Truth(row.time_ns("time_s"), *_place(row), row.optional("heading_rad"))
+        for row in _rows(folder, "truth.csv", "time_s", "x_m", "y_m")
     ]
+
+
+def _place(row: Row) -> tuple[float, float]:
+    """A position [m], both NaN where either is not known."""
+    x, y = row.optional("x_m"), row.optional("y_m")
+    return (math.nan, math.nan) if x is None or y is None else (x, y)

@@ -96,10 +96,10 @@ def _truth(track: TruthTrack) -> Iterator[tuple[int, float, float, float]]:
 def export_tum(path: Path, folder: Path) -> list[Path]:
     """Write truth and recorded estimates as TUM files (time x y z qx qy qz qw) into ``folder``; answers the files.
 
-    The format has no way to leave the heading out: one that is not known is written as zero.
+    A heading that is not known is a quaternion of zeros, which is no rotation: `fusion bench score` reads it so.
     """
     run = read_run(path)
-    tracks = {name: [_tum(e.time_ns, *e.pose) for e in _last_words(lane)] for name, lane in run.lanes.items()}
+    tracks = {name: [_tum_of(estimate) for estimate in _last_words(lane)] for name, lane in run.lanes.items()}
     if run.truth is not None:
         tracks["truth"] = [_tum(*row) for row in _truth(run.truth)]
     if not tracks:
@@ -113,9 +113,15 @@ def _last_words(lane: Sequence[Estimate]) -> list[Estimate]:
     return [by_time[time_ns] for time_ns in sorted(by_time)]
 
 
+def _tum_of(estimate: Estimate) -> Sequence[Cell]:
+    x, y, heading = estimate.pose
+    return _tum(estimate.time_ns, x, y, heading if estimate.heading_known else math.nan)
+
+
 def _tum(time_ns: int, x: float, y: float, heading: float) -> Sequence[Cell]:
-    half = 0.0 if math.isnan(heading) else 0.5 * heading
-    return (seconds_text(time_ns), x, y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
+    """A row; a heading of NaN is not known."""
+    turned = (0.0, 0.0) if math.isnan(heading) else (math.sin(0.5 * heading), math.cos(0.5 * heading))
+    return (seconds_text(time_ns), x, y, 0.0, 0.0, 0.0, *turned)
 
 
 def _write(path: Path, header: list[str] | None, rows: Iterable[Sequence[Cell]], *, separator: str = ",") -> Path:

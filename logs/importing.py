@@ -40,7 +40,7 @@ def import_recordings(kind: str, folder: Path, output: Path, **options: Any) -> 
     if not folder.is_dir() and not (kind == OPEN and folder.is_file()):
         raise RecordingError(f"{folder}: no such folder; give the folder that holds the recording")
     found = list(importlib.import_module(KINDS[kind]).recordings(folder, **options))
-    for warning in (warning for recording in found for warning in recording.warnings):
+    for warning in (warning for recording in found for warning in recording.doubts):
         sys.stderr.write(f"warning: {warning}\n")
     if output.suffix != ".mcap":
         return [recording.write(output / f"{recording.name}.mcap") for recording in found]

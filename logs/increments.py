@@ -57,7 +57,7 @@ def pose_increments(topic: Topic) -> Increments:
 
     The distance is the way along the heading half-way through the turn, so that adding the increments up by the
     mid-point rule (`fusion.Increment`) gives the robot's own poses back, if it moves along arcs. A robot that moves
-    sideways loses that part, and a warning says how much.
+    sideways loses that part, and poses without a heading or a position are left out; warnings count both.
     """
 
     def motion(before: PoseSample, after: PoseSample) -> Motion:
@@ -65,7 +65,15 @@ def pose_increments(topic: Topic) -> Increments:
         c, s = math.cos(0.5 * turn), math.sin(0.5 * turn)
         return Motion(c * x + s * y, turn, abs(c * y - s * x), math.hypot(x, y))
 
-    return _chain(topic.name, _in_order(topic.samples, PoseSample), motion)
+    poses = _in_order(topic.samples, PoseSample)
+    whole = [(arrived_ns, pose) for arrived_ns, pose in poses if pose.is_whole]
+    chained = _chain(topic.name, whole, motion)
+    if len(whole) < len(poses):
+        missing = len(poses) - len(whole)
+        chained.warnings.append(
+            f"{topic.name}: {missing} of {len(poses)} poses lack heading or position, and are left out"
+        )
+    return chained
 
 
 def wheel_increments(topic: Topic, joints: Sequence[str], robot: Robot) -> Increments:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Sequence
@@ -43,7 +44,8 @@ def describe(path: Path) -> dict[str, Any]:
         "duration_s": _duration_s(run),
         "channels": _channels(log.arrivals),
         "truth": 0 if run.truth is None else len(run.truth),
-        "prior": None if run.prior is None else [*run.prior.pose],
+        "true_headings": 0 if run.truth is None else int(np.isfinite(run.truth.heading).sum()),
+        "prior": None if run.prior is None else [n if math.isfinite(n) else None for n in run.prior.pose],
         "position_known": run.prior is not None and run.prior.position_known,
         "heading_known": run.prior is not None and run.prior.heading_known,
         "estimators": {name: len(estimates) for name, estimates in run.lanes.items()},

@@ -50,7 +50,7 @@ def _log(about: Facts) -> Iterator[str]:
         head = f"  {row['kind']:<12} {row['sensor']:<12} {row['count']:>7}  {_rate(row['rate_hz']):>10}"
         yield f"{head}  {', '.join(_oddities(row))}"
     yield from _recording(about)
-    yield f"truth: {about['truth']} poses" if about["truth"] else "truth: none, so errors cannot be scored"
+    yield _truth(about)
     yield f"start: {_start(about)}"
     yield from (f"estimates of {name}: {count}" for name, count in about["estimators"].items())
     yield "estimators that could use it, by their tags and a short replay:"
@@ -88,6 +88,14 @@ def _oddities(row: Facts) -> Iterator[str]:
         yield f"{len(row['clock_jumps'])} clock jumps in all"
     if row["log_time_backwards"]:
         yield f"times that the log time runs backwards: {row['log_time_backwards']}"
+
+
+def _truth(about: Facts) -> str:
+    if not about["truth"]:
+        return "truth: none, so errors cannot be scored"
+    headings = about["true_headings"]
+    known = "" if headings == about["truth"] else f", the heading known at {headings or 'none'} of them"
+    return f"truth: {about['truth']} poses{known}"
 
 
 def _start(about: Facts) -> str:

@@ -3,7 +3,8 @@
 Standard ROS 2 types where one exists, a few `fusion_msgs` of our own where none does. The stamp holds the time a
 measurement was true, ``frame_id`` the sensor's name, the MCAP sequence number its ``seq``. Numbers are doubles and
 come back to the bit, but for headings that pass through a quaternion; the prior's is kept in the log's metadata too,
-because a replay starts from it. An all-zero quaternion says that the heading is not known.
+because a replay starts from it. An all-zero quaternion states that the heading is not known, and so does, of other
+people's messages, one that is not finite.
 """
 
 from __future__ import annotations
@@ -114,9 +115,12 @@ def take_pose(cursor: Unpacker) -> tuple[Pose, bool]:
 
 
 def planar(x: float, y: float, qx: float, qy: float, qz: float, qw: float) -> tuple[Pose, bool]:
-    """What a pose in space is on the floor, and whether its heading is known: the yaw of a unit quaternion."""
-    heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-    return Pose(x, y, heading), any((qx, qy, qz, qw))
+    """What a pose in space is on the floor, and whether its heading is known: the yaw of a unit quaternion. Not of one
+    that is no rotation, all zero or not finite: the heading is zero then, and not known.
+    """
+    if not any((qx, qy, qz, qw)) or not all(map(math.isfinite, (qx, qy, qz, qw))):
+        return Pose(x, y, 0.0), False
+    return Pose(x, y, math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))), True
 
 
 def _put_covariance(message: Packer, covariance: Covariance | None) -> Packer:
@@ -134,7 +138,9 @@ def _put_covariance(message: Packer, covariance: Covariance | None) -> Packer:
 
 def _take_covariance(cursor: Unpacker) -> Covariance | None:
     c = cursor.take("d", 36)
-    return None if c[0] == NOT_GIVEN else Covariance(c[0], c[1], c[5], c[7], c[11], c[35])
+    if c[0] == NOT_GIVEN:
+        return None
+    return Covariance.from_matrix([[c[6 * row + column] for column in (0, 1, 5)] for row in (0, 1, 5)])
 
 
 def _encode_ticks(value: WheelTicks) -> bytes:
@@ -249,7 +255,8 @@ FATES_TOPIC = "/fates/"
 
 def encode_truth(truth: Truth) -> bytes:
     """Ground truth."""
-    pose, known = Pose(truth.x, truth.y, truth.heading or 0.0), truth.heading is not None
+    heading = truth.known_heading
+    pose, known = Pose(truth.x, truth.y, heading or 0.0), heading is not None
     return _put_pose(stamped(truth.time_ns, MAP), pose, heading_known=known).message()
 
 

@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 from mcap.records import Message
 
-from fusion import Estimate, FusionError, LogError, Measurement, Prior, Remark, Truth, World
+from fusion import BeliefError, Estimate, FusionError, LogError, Measurement, Prior, Remark, Truth, World
 from logs import device_messages, messages
 from logs.damage import Damage
 from logs.device_messages import ClockSync
 from logs.messages import DECODERS, ESTIMATE_TOPIC, FATES_TOPIC
-from logs.run import Run, TruthTrack
+from logs.run import Run, TruthTrack, left_out
 from logs.walk import Walk
 from logs.wheel_direction import caution_of_run
 from logs.writer import RUN_RECORD
@@ -32,6 +32,7 @@ class _Contents:
     lanes: dict[str, list[Estimate]] = field(default_factory=dict)
     remarks: list[Remark] = field(default_factory=list)
     clocks: list[ClockSync] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
     unreadable: dict[str, int] = field(default_factory=dict)
     foreign: dict[str, int] = field(default_factory=dict)
 
@@ -65,7 +66,7 @@ def read_log(path: Path) -> Log:
         prior=contents.prior,
         metadata={key: value for key, value in contents.record.items() if key != "world"},
         measurements=tuple(item[1] for item in sorted(contents.measurements, key=lambda item: item[0])),
-        truth=TruthTrack.from_truths(contents.truths) if contents.truths else None,
+        truth=TruthTrack.from_truths(contents.truths) or None,
         warnings=(*walk.warnings, *_warnings(path, contents, world), *_cautions(path, contents, world)),
         lanes={name: tuple(estimates) for name, estimates in contents.lanes.items()},
         remarks=tuple(contents.remarks),
@@ -114,7 +115,7 @@ def _take(contents: _Contents, topic: str, schema: str, message: Message) -> Non
         if topic == messages.TRUTH[0]:
             contents.truths.append(messages.decode_truth(message.data))
         elif topic == messages.PRIOR[0]:
-            contents.prior = messages.decode_prior(message.data, contents.record)
+            _take_prior(contents, message.data)
         elif topic.startswith(ESTIMATE_TOPIC):
             estimate = messages.decode_estimate(message.data)
             contents.lanes.setdefault(topic.removeprefix(ESTIMATE_TOPIC), []).append(estimate)
@@ -130,10 +131,20 @@ def _take(contents: _Contents, topic: str, schema: str, message: Message) -> Non
         contents.unreadable[topic] = contents.unreadable.get(topic, 0) + 1
 
 
+def _take_prior(contents: _Contents, data: bytes) -> None:
+    """A prior that no estimator could start from is as good as none: the start then comes from the truth."""
+    try:
+        contents.prior = messages.decode_prior(data, contents.record)
+    except BeliefError as error:
+        contents.refused.append(f"its starting prior is left out ({error})")
+
+
 def _warnings(path: Path, contents: _Contents, world: World) -> tuple[str, ...]:
     found = []
     if contents.record.get("world_hash", world.hash) != world.hash:
         found.append(f"{path}: the world stored in it is not the one it was written with; its hash differs")
+    uncounted = left_out([truth.position_known for truth in contents.truths])
+    found += [f"{path}: {sentence}" for sentence in (*contents.refused, *uncounted)]
     found += [f"{path}: {count} messages of {topic} cannot be decoded" for topic, count in contents.unreadable.items()]
     found += [f"{path}: {count} messages of {topic} are of no use here" for topic, count in contents.foreign.items()]
     if not contents.measurements:

@@ -21,10 +21,16 @@ from fusion import (
     Truth,
     World,
 )
+from fusion.belief import UNKNOWN_HEADING_STD
 from fusion.errors import did_you_mean
 from fusion.track import order
 from fusion.values import NANOSECONDS
+from logs.run import left_out
 from logs.writer import RunWriter
+
+POSITION_STD_M = 0.05
+"""How well a start taken from the truth is known."""
+HEADING_STD_RAD = 0.05
 
 
 @dataclass(frozen=True)
@@ -41,6 +47,12 @@ class Recording:
     """When each measurement, and then each truth, arrived; None: when it was true."""
     warnings: Sequence[str] = ()
     """What is lost or doubtful, in sentences."""
+
+    @property
+    def doubts(self) -> list[str]:
+        """The warnings, and how many true poses have no position."""
+        uncounted = left_out([truth.position_known for truth in self.truths])
+        return [*self.warnings, *(f"{self.name}: {sentence}" for sentence in uncounted)]
 
     def write(self, path: Path) -> Path:
         """Write it as a log, in the order of arrival."""
@@ -89,6 +101,15 @@ class Row:
             raise RecordingError(
                 f"{self.place}: {column} is {self.text(column)!r}, not a number; correct it"
             ) from error
+
+    def optional(self, column: str) -> float | None:
+        """A cell as a finite number, None where it is empty or ``nan`` and so not known; raises `RecordingError`."""
+        number = self.number(column) if self.text(column) else math.nan
+        if math.isinf(number):
+            raise RecordingError(
+                f"{self.place}: {column} is {self.text(column)!r}, not a finite number; leave it empty if not known"
+            )
+        return None if math.isnan(number) else number
 
     def time_ns(self, column: str) -> int:
         """A cell holding seconds, in nanoseconds."""
@@ -144,22 +165,24 @@ def heading_from_motion(odometry: Sequence[Odometry], truths: Sequence[Truth], p
 def prior_from_truth(
     odometry: Sequence[Odometry], truths: Sequence[Truth], *, path_m: float = 1.0, heading_std: float = 0.2
 ) -> tuple[Prior | None, str]:
-    """A starting prior at the first true pose, and a sentence that says how it was made.
+    """A starting prior at the first true pose with a position, and a sentence that states how it was made.
 
-    Without a heading in the truth, it is found from the first ``path_m`` of motion, with ``heading_std`` [rad].
+    Without a heading there, it is found from the first ``path_m`` of motion, with ``heading_std`` [rad], or unknown.
     """
-    if not truths:
+    placed = [truth for truth in truths if truth.position_known]
+    if not placed:
         return None, "no truth: start unknown"
-    first = truths[0]
-    if first.heading is not None:
-        return (
-            Prior(first.time_ns, Pose(first.x, first.y, first.heading), Covariance.from_std(0.05, 0.05, 0.05)),
-            "first true pose, 0.05 m, 0.05 rad",
-        )
+    first, heading = placed[0], placed[0].known_heading
+    if heading is not None:
+        return _prior(first, heading, HEADING_STD_RAD), "first true pose, 0.05 m, 0.05 rad"
     after = [step for step in odometry if step.time_ns > first.time_ns]
-    heading = heading_from_motion(after, truths, path_m)
-    pose = Pose(first.x, first.y, heading or 0.0)
-    prior = Prior(first.time_ns, pose, Covariance.from_std(0.05, 0.05, heading_std), heading_known=heading is not None)
+    heading = heading_from_motion(after, placed, path_m)
     if heading is None:
-        return prior, "first true position, heading unknown"
-    return prior, f"first true position, heading from the first {path_m:g} m of motion against the truth"
+        return _prior(first, None, UNKNOWN_HEADING_STD), "first true position, heading unknown"
+    how = f"first true position, heading from the first {path_m:g} m of motion against the truth"
+    return _prior(first, heading, heading_std), how
+
+
+def _prior(first: Truth, heading: float | None, heading_std: float) -> Prior:
+    spread = Covariance.from_std(POSITION_STD_M, POSITION_STD_M, heading_std)
+    return Prior(first.time_ns, Pose(first.x, first.y, heading or 0.0), spread, heading_known=heading is not None)

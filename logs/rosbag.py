@@ -48,8 +48,8 @@ def read_bag(
         prior=found.prior,
         metadata=found.metadata,
         measurements=tuple(found.measurements),
-        truth=TruthTrack.from_truths(found.truths) if found.truths else None,
-        warnings=tuple(found.warnings),
+        truth=TruthTrack.from_truths(found.truths) or None,
+        warnings=tuple(found.doubts),
         lanes={},
     )
 

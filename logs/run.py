@@ -26,17 +26,33 @@ class TruthTrack:
     def __len__(self) -> int:
         return len(self.time_ns)
 
+    def at(self, rows: NDArray[np.bool_]) -> TruthTrack:
+        """Some of it, by mask."""
+        return TruthTrack(self.time_ns[rows], self.x[rows], self.y[rows], self.heading[rows])
+
     @classmethod
     def from_truths(cls, truths: Sequence[Truth]) -> TruthTrack:
-        """Columns, read-only, from single truths; of two at one time the first counts."""
-        ordered = sorted(truths, key=lambda truth: truth.time_ns)
+        """Columns, read-only, from single truths: those with a position; of two at one time the first counts."""
+        ordered = sorted((truth for truth in truths if truth.position_known), key=lambda truth: truth.time_ns)
         unique = [truth for i, truth in enumerate(ordered) if i == 0 or truth.time_ns != ordered[i - 1].time_ns]
         time_ns = np.array([truth.time_ns for truth in unique], dtype=np.int64)
         x, y = np.array([t.x for t in unique], dtype=np.float64), np.array([t.y for t in unique], dtype=np.float64)
-        heading = np.array([np.nan if t.heading is None else t.heading for t in unique], dtype=np.float64)
+        heading = np.array([np.nan if t.known_heading is None else t.heading for t in unique], dtype=np.float64)
         for column in (time_ns, x, y, heading):
             column.flags.writeable = False
         return cls(time_ns, x, y, heading)
+
+
+def left_out(placed: Sequence[bool]) -> list[str]:
+    """A sentence that counts the true poses without a position, which no track holds; none where all have one.
+    ``placed``: whether each has.
+    """
+    missing = len(placed) - sum(placed)
+    if not missing:
+        return []
+    if missing == len(placed):
+        return [f"none of the {missing} true poses has a position, so there is no ground truth"]
+    return [f"{missing} of {len(placed)} true poses have no position, and are left out"]
 
 
 @dataclass(frozen=True, slots=True)

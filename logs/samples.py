@@ -17,7 +17,7 @@ from logs.messages import DECODERS, take_header, take_pose
 
 
 class PoseSample(NamedTuple):
-    """Where the frame ``child`` (may be "") is in the frame ``parent``; heading None when not known."""
+    """Where the frame ``child`` (may be "") is in the frame ``parent``; heading None when not known, x and y NaN."""
 
     time_ns: int
     parent: str
@@ -30,6 +30,11 @@ class PoseSample(NamedTuple):
     def pose(self) -> Pose:
         """The pose; a heading that is not known stands as zero."""
         return Pose(self.x, self.y, self.heading or 0.0)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether position and heading are known."""
+        return self.heading is not None and math.isfinite(self.x)
 
 
 class JointSample(NamedTuple):
@@ -54,11 +59,9 @@ Decoder: TypeAlias = Callable[[bytes], list[Sample]]
 
 
 def pose_sample(time_ns: int, parent: str, child: str, pose: Pose, heading_known: bool) -> PoseSample:
-    """A pose whose numbers are finite; raises `ValueError` for another. Leading slashes of frames (ROS 1) go."""
-    if not all(map(math.isfinite, pose)):
-        raise ValueError(f"the pose {pose} is not finite")
-    heading = pose.heading if heading_known else None
-    return PoseSample(time_ns, parent.lstrip("/"), child.lstrip("/"), pose.x, pose.y, heading)
+    """A pose; of a position that is not finite neither coordinate is known. Leading slashes of frames (ROS 1) go."""
+    x, y, heading = pose if math.isfinite(pose.x) and math.isfinite(pose.y) else (math.nan, math.nan, pose.heading)
+    return PoseSample(time_ns, parent.lstrip("/"), child.lstrip("/"), x, y, heading if heading_known else None)
 
 
 def _pose(data: bytes, *, has_child: bool = False) -> list[Sample]:
@@ -74,9 +77,7 @@ def _transforms(data: bytes) -> list[Sample]:
     found: list[Sample] = []
     for _ in range(cursor.whole()):
         (time_ns, parent), child = take_header(cursor), cursor.text()
-        pose, heading_known = take_pose(cursor)
-        if all(map(math.isfinite, pose)):  # a frame that nobody asked for may well be no number
-            found.append(pose_sample(time_ns, parent, child, pose, heading_known))
+        found.append(pose_sample(time_ns, parent, child, *take_pose(cursor)))
     return found
 
 

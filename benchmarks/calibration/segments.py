@@ -143,11 +143,15 @@ def _chord_m(truth: Instants, piece: Piece) -> float:
 
 def _with_heading(truth: Instants, number: int, piece: Piece) -> Segment:
     """Lengths of straight pieces only: a spin goes nowhere, and the chord of an arc tells more of its turn. A heading
-    that is missing at an end leaves the turn unknown.
+    that is missing at an end leaves the turn unknown, and missing for longer, what was driven.
     """
-    heading = truth.heading[piece.first : piece.last + 1]
-    known = np.unwrap(heading[np.isfinite(heading)])
-    turn = float(known[-1] - known[0]) if np.isfinite(heading[[0, -1]]).all() else math.nan
+    heading, time_ns = truth.heading[piece.first : piece.last + 1], truth.time_ns[piece.first : piece.last + 1]
+    is_known = np.isfinite(heading)
+    known_ns = np.concatenate([time_ns[:1], time_ns[is_known], time_ns[-1:]])
+    if np.diff(known_ns).max() > nanoseconds(GAP_S):
+        return Segment(number, piece.kind, int(time_ns[0]), int(time_ns[-1]), math.nan, math.nan)
+    known = np.unwrap(heading[is_known])
+    turn = float(known[-1] - known[0]) if is_known[[0, -1]].all() else math.nan
     kind = ARC if piece.kind == STRAIGHT and abs(turn) > STRAIGHT_RAD else piece.kind
     distance = _chord_m(truth, piece) if kind == STRAIGHT else math.nan
     return Segment(number, kind, int(truth.time_ns[piece.first]), int(truth.time_ns[piece.last]), distance, turn)

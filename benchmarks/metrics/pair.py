@@ -26,6 +26,7 @@ class PairScore(NamedTuple):
     moved the estimate.
 
     The latter are None without alignment; where one was asked for and is impossible, ``align`` says so all the same.
+    ``warnings``: what of the truth is left out, in sentences.
     """
 
     truth: str
@@ -35,6 +36,7 @@ class PairScore(NamedTuple):
     metrics: dict[str, float]
     aligned: dict[str, float] | None = None
     map_from_estimate: Pose | None = None
+    warnings: tuple[str, ...] = ()
 
     @property
     def ratio(self) -> float:
@@ -50,7 +52,7 @@ class PairScore(NamedTuple):
             transform = dict(zip(("x_m", "y_m", "yaw_rad"), self.map_from_estimate, strict=True))
             aligned = {**transform, **for_json({"ratio": self.ratio, **self.aligned})}
         head = {"truth": self.truth, "estimate": self.estimate, "mode": self.mode, "align": self.align}
-        return {**head, **for_json(self.metrics), "aligned": aligned}
+        return {**head, "warnings": list(self.warnings), **for_json(self.metrics), "aligned": aligned}
 
 
 def score_pair(
@@ -71,7 +73,7 @@ def score_pair(
     for given, known in ((mode, MODES), (alignment, ("none", *ALIGNMENTS))):
         if given not in known:
             raise ParameterError(f"{given!r} does not exist; {did_you_mean(given, known)}")
-    true, said = read_truth(truth), read_track(estimate)
+    (true, warnings), said = read_truth(truth), read_track(estimate)
     weight, availability = None, {}
     if mode == "interp":
         instants, answers, weight, share = meet(true, said, gap_s=gap_s)
@@ -82,7 +84,7 @@ def score_pair(
     if not answers.valid.any():
         raise LogError(f"{estimate}: {_nothing_met(true, mode, gap_s)} (truth: {truth})")
     raw = {**metrics(errors(instants, answers, weight)), **availability}
-    score = PairScore(str(truth), str(estimate), mode, alignment, raw)
+    score = PairScore(str(truth), str(estimate), mode, alignment, raw, warnings=warnings)
     moved = None if alignment == "none" else align(instants, answers, alignment)
     if moved is None:
         return score

@@ -39,6 +39,7 @@ POSITION = (
 )
 QUALITY = (
     Column("n_valid", "poses compared", 1.0, 0),
+    Column("head_n", "instants with a true heading", 1.0, 0),
     Column("availability", "availability, %", 100.0, 1),
     Column("age_p95", "age, p95, s", 1.0, 3),
     Column("dropout_s", "without an answer, s", 1.0, 1),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import IO
 
@@ -31,6 +32,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Score, print the tables, write the record."""
     score = score_pair(arguments.truth, arguments.estimate, mode=arguments.mode, alignment=arguments.align)
+    for warning in score.warnings:
+        sys.stderr.write(f"fusion bench score: {warning}\n")
     if arguments.json != Path("-"):
         print_score(score)
     if arguments.json is not None:

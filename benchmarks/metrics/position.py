@@ -93,10 +93,13 @@ def track_metrics(measured: Errors) -> dict[str, float]:
 
 
 def heading_metrics(measured: Errors) -> dict[str, float]:
-    """Of absolute heading errors [rad]; all NaN for a method, or a truth, that never tells a heading."""
+    """Of absolute heading errors [rad], at the ``head_n`` instants whose true heading is known; NaN for a method, or a
+    truth, without any heading.
+    """
     asked, weight = _where(~np.isnan(measured.heading), measured.heading, measured.weight)
     valid, own = _where(np.isfinite(asked), asked, weight)
     return {
+        "head_n": float(len(asked)),
         "head_mae": mean(valid, own),
         "head_rmse": root_mean_square(valid, own),
         "head_p95": quantile(asked, 0.95, weight) if len(valid) else math.nan,

@@ -19,7 +19,7 @@ from benchmarks.metrics.position import axis_metrics, heading_metrics, position_
 from benchmarks.metrics.quantiles import Ordered, quantile
 from benchmarks.metrics.trajectory import trajectory_metrics
 
-METRICS_VERSION = 9
+METRICS_VERSION = 10
 """Changes whenever a metric does, so that stored scores are not taken for current ones."""
 
 __all__ = [

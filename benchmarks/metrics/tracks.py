@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from pathlib import Path
-from typing import IO
+from typing import IO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,9 @@ from fusion.errors import did_you_mean
 from fusion.values import NANOSECONDS
 from logs.reader import read_run
 from logs.recording import exact_ns
-from logs.run import TruthTrack
+from logs.run import TruthTrack, left_out
+
+Columns: TypeAlias = tuple[Whole, Floats, Floats, Floats]
 
 CSV_COLUMNS = ("time_s", "x_m", "y_m", "heading_rad")
 TUM_COLUMNS = "time x y z qx qy qz qw"
@@ -26,15 +28,20 @@ MOST_SECONDS = 9e9
 """Later is no time in seconds: 64 bits of nanoseconds end in the year 2262."""
 
 
-def read_truth(source: str | Path) -> TruthTrack:
-    """The true poses in a TUM or CSV file, or in a log; raises `LogError`."""
+def read_truth(source: str | Path) -> tuple[TruthTrack, tuple[str, ...]]:
+    """The true poses in a TUM or CSV file, or in a log, and in sentences what is left out; raises `LogError`."""
     path = Path(source)
-    if path.suffix != ".mcap":
-        return TruthTrack(*_read_text(path))
-    truth = read_run(path).truth
-    if truth is None:
-        raise LogError(f"{path}: holds no ground truth; give a log or a file that does")
-    return truth
+    if path.suffix == ".mcap":
+        run = read_run(path)
+        truth, warnings = run.truth, run.warnings
+    else:
+        columns = _read_text(path)
+        placed = _placed(columns)
+        truth = TruthTrack(*columns).at(placed)
+        warnings = tuple(f"{path}: {sentence}" for sentence in left_out(placed.tolist()))
+    if not truth:
+        raise LogError("; ".join([*warnings, f"{path}: holds no ground truth; give a log or a file that does"]))
+    return truth, warnings
 
 
 def read_track(source: str | Path) -> Track:
@@ -46,7 +53,9 @@ def read_track(source: str | Path) -> Track:
         path, name = str(source), ""
     if path.endswith(".mcap"):
         return _read_lane(Path(path), name)
-    return Track.of_poses(*_read_text(Path(path)))
+    columns = _read_text(Path(path))
+    _refuse(Path(path), ~_placed(columns), "holds no position; remove the row")
+    return Track.of_poses(*columns)
 
 
 def _read_lane(path: Path, name: str) -> Track:
@@ -61,8 +70,14 @@ def _read_lane(path: Path, name: str) -> Track:
     return Track.of_estimates(lanes[chosen])
 
 
-def _read_text(path: Path) -> tuple[Whole, Floats, Floats, Floats]:
-    """Time [ns], x, y [m], heading [rad] (NaN where a CSV leaves it empty), of a TUM or CSV file."""
+def _placed(columns: Columns) -> Flags:
+    """Whether each pose has a position."""
+    _, x, y, _ = columns
+    return np.isfinite(x) & np.isfinite(y)
+
+
+def _read_text(path: Path) -> Columns:
+    """Time [ns], x, y [m], heading [rad], NaN where they are not known, of a TUM or CSV file."""
     try:
         rows = _read_csv(path) if path.suffix == ".csv" else _read_tum(path)
     except (OSError, UnicodeDecodeError) as error:
@@ -76,28 +91,26 @@ def _read_text(path: Path) -> tuple[Whole, Floats, Floats, Floats]:
     return time_ns, x, y, heading
 
 
-def _read_tum(path: Path) -> tuple[Whole, Floats, Floats, Floats]:
+def _read_tum(path: Path) -> Columns:
+    """Of a quaternion of zeros or NaN, which is no rotation, no heading is known."""
     with path.open(encoding="utf-8") as stream:
         time_ns, table = _parse(path, stream, 7, TUM_COLUMNS, None)
-    _refuse(path, ~np.isfinite(table).all(axis=1), "holds a number that is not finite; remove the row")
-    _refuse(path, ~table[:, 3:].any(axis=1), "has a quaternion of zeros, which is no rotation; write 0 0 0 1")
     x, y, _, qx, qy, qz, qw = table.T
     # A quaternion of any length is the rotation of the one of length 1.
     heading = np.arctan2(2.0 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
-    return time_ns, x, y, heading
+    return time_ns, x, y, np.where(table[:, 3:].any(axis=1), heading, np.nan)
 
 
-def _read_csv(path: Path) -> tuple[Whole, Floats, Floats, Floats]:
+def _read_csv(path: Path) -> Columns:
     head, _, body = path.read_text(encoding="utf-8-sig").partition("\n")
     names = tuple(head.strip().split(","))
     if names not in (CSV_COLUMNS, CSV_COLUMNS[:3]):
         raise LogError(f"{path}: the first line must be {','.join(CSV_COLUMNS)} (heading_rad may be missing)")
-    # An empty last cell is a heading that is not known.
+    # An empty cell is a number that is not known.
     body = body.replace("\r\n", "\n").replace(",\n", ",nan\n") + ("nan" if body.endswith(",") else "")
+    body = body.replace(",,", ",nan,").replace(",,", ",nan,")
     time_ns, table = _parse(path, io.StringIO(body), len(names) - 1, ",".join(names), ",")
-    _refuse(path, ~np.isfinite(table[:, :2]).all(axis=1), "holds a position that is not finite; remove the row")
     heading = table[:, 2] if len(names) > 3 else np.full(len(table), np.nan)
-    _refuse(path, np.isinf(heading), "holds a heading that is infinite; leave it empty")
     return time_ns, table[:, 0], table[:, 1], heading
 
 
@@ -116,7 +129,9 @@ def _parse(path: Path, text: IO[str], numbers: int, columns: str, separator: str
             table = np.loadtxt(text, dtype=row, delimiter=separator, ndmin=1)
     except ValueError as error:
         raise LogError(f"{path}: is not a table of {columns} ({error}); correct it") from error
-    return _times_ns(path, table["time"]), np.ascontiguousarray(table["numbers"])
+    found = np.ascontiguousarray(table["numbers"])
+    _refuse(path, np.isinf(found).any(axis=1), "holds a number that is infinite; write nan where it is not known")
+    return _times_ns(path, table["time"]), found
 
 
 def _times_ns(path: Path, texts: NDArray[np.bytes_]) -> Whole:
@@ -126,7 +141,7 @@ def _times_ns(path: Path, texts: NDArray[np.bytes_]) -> Whole:
     """
     characters = np.ascontiguousarray(texts).view(np.uint8).reshape(-1, TIME_WIDTH)
     value, decimals = np.zeros(len(texts), dtype=np.int64), np.full(len(texts), -1)
-    plain = np.ones(len(texts), dtype=bool)
+    plain = characters.any(axis=1)
     for column in characters[:, characters.any(axis=0)].T:
         digit = (column >= ord("0")) & (column <= ord("9"))
         point = (column == ord(".")) & (decimals < 0)

@@ -9,7 +9,8 @@ NOTES: Mapping[str, str] = {
         "Estimators that share a letter under `alike` cannot be told apart. Over runs: geometric mean with its 95 % t "
         "interval. Worst run: the highest score of all. All other numbers are medians over cells. p75: three quarters "
         "of the instants err less. Quantiles count every instant; RMSE, mean and max only those with a valid answer, "
-        "so read them with the availability, the share of such instants."
+        "so read them with the availability, the share of such instants; heading errors only those whose true heading "
+        "is known (`head_n` of the exported numbers)."
     ),
     "pairs": (
         "Ratio of the first to the second: geometric mean over runs with its 95 % t interval, below 1 where the first "

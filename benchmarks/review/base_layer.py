@@ -78,19 +78,20 @@ def _draw_truth(canvas: Canvas, truth: TruthTrack) -> None:
     known = np.flatnonzero(np.isfinite(truth.x) & np.isfinite(truth.y))
     xy = np.column_stack([truth.x, truth.y])[known]
     draw_path(canvas, ["map", "truth"], TRUTH, truth.time_ns[known], xy)
-    turned = known[np.isfinite(truth.heading[known])]
-    _draw_heading(canvas, truth.time_ns[turned], truth.x[turned], truth.y[turned], truth.heading[turned])
+    _draw_heading(canvas, truth.time_ns[known], xy, truth.heading[known])
 
 
-def _draw_heading(canvas: Canvas, time_ns: Stamps, x: Floats, y: Floats, heading: Floats) -> None:
-    """Where the robot looks: an arrow from its true place at the time cursor."""
-    if len(time_ns) == 0:
+def _draw_heading(canvas: Canvas, time_ns: Stamps, xy: Floats, heading: Floats) -> None:
+    """Where the robot looks: an arrow from its true place at the time cursor, none while that is not known."""
+    if not np.isfinite(heading).any():
         return
-    origins, angle = thinned(np.column_stack([x, y])), thinned(heading)
-    vectors = ARROW_M * np.column_stack([np.cos(angle), np.sin(angle)])
+    origins, angle = thinned(xy), thinned(heading)
+    known = np.isfinite(angle)
+    vectors = ARROW_M * np.column_stack([np.cos(angle), np.sin(angle)])[known]
     rr, place = canvas.rr, ["map", "truth", "heading"]
     canvas.style(place, rr.Arrows2D.from_fields(colors=[TRUTH], radii=[-1.5]))
-    canvas.columns(place, thinned(time_ns), rr.Arrows2D.columns(vectors=vectors, origins=origins))
+    arrows = rr.Arrows2D.columns(vectors=vectors, origins=origins[known]).partition(known.astype(np.int64))
+    canvas.columns(place, thinned(time_ns), arrows)
 
 
 def _draw_readings(canvas: Canvas, world: World, readings: Heard) -> None:

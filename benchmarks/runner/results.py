@@ -23,7 +23,7 @@ from fusion.errors import did_you_mean
 
 RANKED_BY = "pos_p75"
 MORE_IS_BETTER = re.compile(
-    r"n|n_valid|.*n_eff|.*availability|cover.*|pos_auc|pos_cdf_.*|t_conv_share|nis95_.*|white_.*|rpe_.*_n"
+    r"n|n_valid|head_n|.*n_eff|.*availability|cover.*|pos_auc|pos_cdf_.*|t_conv_share|nis95_.*|white_.*|rpe_.*_n"
 )
 NEITHER_IS_BETTER = re.compile(r"anees.*|nll_.*|.*bias.*|cov_.*|path_ratio|eag|.*growth")
 """Their best is 1 or 0, or they may be negative and so have no ratio."""

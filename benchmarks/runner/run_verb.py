@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from benchmarks.arguments import at_least_one
 from benchmarks.progress import Progress, progress_bar
-from benchmarks.runner.definition import Suite
+from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.execute import Done, execute
 from benchmarks.runner.plan import Cell, cells_of, missing, shard
 from benchmarks.runner.plan_verb import opened, suite_options
@@ -18,6 +18,7 @@ from benchmarks.runner.refusals import refuse_impossible
 from benchmarks.runner.results import ALIVE, Result, leaderboard, read_results, warnings
 from benchmarks.runner.store import Store
 from benchmarks.sheet import print_sheets
+from benchmarks.table import partly_headed
 from benchmarks.workers import Limits
 
 
@@ -67,6 +68,12 @@ def lost(results: Sequence[Result]) -> list[str]:
     return [f"{name} lost {count} of its cells: {error}" for (name, error), count in counted.items()]
 
 
+def remarks(results: Sequence[Result]) -> list[str]:
+    """Where the truth of a run has a heading at some instants only, one sentence for each run."""
+    told = [(one.cell.run.id, partly_headed(one.metrics)) for one in results if one.cell.fault.id == CLEAN]
+    return [f"{run}: {sentence}" for run, sentence in dict(told).items() if sentence]
+
+
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion bench run``."""
     suite_options(parser)
@@ -95,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
     sys.stderr.write(
         f"fusion bench run: {', '.join(f'{count} {status}' for status, count in sorted(counted.items()))}\n"
     )
-    for reason in (*warnings(results), *lost(results)):
+    for reason in (*warnings(results), *lost(results), *remarks(results)):
         sys.stderr.write(f"fusion bench run: {reason}\n")
     print_sheets([leaderboard(results)])
     return 0 if any(result.status in ALIVE for result in results) else 1

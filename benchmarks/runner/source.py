@@ -15,7 +15,7 @@ from fusion import SuiteError, World
 from fusion.values import nanoseconds
 from logs.reader import read_run, read_world
 from logs.rosbag import read_bag
-from logs.run import Run, TruthTrack
+from logs.run import Run
 from sensors.simulation.scenario import load_scenario, scenario_text
 from sensors.simulation.simulate import simulated_run
 
@@ -98,10 +98,7 @@ def scenario_of(scenario: str, folder: Path) -> str | Path:
 def _cut(run: Run, end_ns: int) -> Run:
     """The run up to ``end_ns``."""
     kept = tuple(measurement for measurement in run.measurements if measurement.time_ns <= end_ns)
-    truth = run.truth
-    if truth is not None:
-        early = truth.time_ns <= end_ns
-        truth = TruthTrack(truth.time_ns[early], truth.x[early], truth.y[early], truth.heading[early])
+    truth = run.truth and run.truth.at(run.truth.time_ns <= end_ns)
     return replace(run, measurements=kept, truth=truth)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fusion import Covariance, Driver, DriverError, Pose, Prior, SettingError, World, WorldError, load
+from fusion import BeliefError, Covariance, Driver, DriverError, Pose, Prior, SettingError, World, WorldError, load
 from fusion.driver import Clock
 from fusion.errors import did_you_mean
 from fusion.plugins import SENSORS
@@ -87,10 +87,11 @@ class RobotFile:
     def _from_table(cls, table: Mapping[str, Any], path: Path, text: str) -> RobotFile:
         check_keys(table, dict.fromkeys(("name", "world", "start", "record", "sensors")), "robot file")
         sensors = _sensors(table.get("sensors"))
+        world = _world(table.get("world"), path.parent)
         return cls(
             name=str(table.get("name", path.stem)),
-            world=_world(table.get("world"), path.parent),
-            start=read_record(Start, table.get("start", {}), "start"),
+            world=world,
+            start=_start(table.get("start", {}), world),
             policy=_policy(read_record(Policy, table.get("record", {}), "record")),
             sensors=sensors,
             text=text,
@@ -122,6 +123,19 @@ def _world(given: object, folder: Path) -> World:
     if isinstance(given, Mapping):
         return World.from_table(given)
     raise WorldError('world: name a world file, as in world = "hall.toml", or write the world as a table [world]')
+
+
+def _start(given: object, world: World) -> Start:
+    """A start that makes a prior."""
+    start = read_record(Start, given, "start")
+    for key in ("position_std_m", "heading_std_deg"):
+        if getattr(start, key) < 0.0:
+            raise WorldError(f"start.{key}: {getattr(start, key)} must not be negative; it is a standard deviation")
+    try:
+        start.prior(0, world)
+    except BeliefError as error:
+        raise WorldError(f"start: {error}") from error
+    return start
 
 
 def _sensors(rows: object) -> tuple[Sensor, ...]:

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 import fusion
 from benchmarks.bench import bench, parse_settings, pooled, remarks, write_records
-from benchmarks.cell import Score
+from benchmarks.cell import Cell, Score, score_lane
 from benchmarks.lane import run_lane
 from benchmarks.prior import starting_prior
 from benchmarks.table import print_tables, ranked
@@ -218,6 +219,15 @@ def test_runs_without_truth_stay_out_of_the_table_of_all(tmp_path, capsys):
     assert "the 2 runs with truth together" in capsys.readouterr().out
     print_tables(scores[:2], pooled(scores[:2]))
     assert "together" not in capsys.readouterr().out
+
+
+def test_true_heading_that_is_known_in_part_is_told_with_its_number():
+    heading = np.where(np.arange(60) < 45, 0.0, np.nan)
+    run = run_in_memory(truth=TruthTrack(np.arange(60) * TENTH_NS, np.arange(60) * 0.1, np.zeros(60), heading))
+    score = score_lane(Cell(Path("run.mcap"), "toy_wheels", {}, 0), run, run_lane(run, "toy_wheels"))
+    (remark,) = remarks([score])
+    assert remark == "run: the true heading is known at 45 of 60 instants, and heading errors are of these alone"
+    assert score.record()["head_n"] == 45.0
 
 
 def test_pooled_figures_take_all_instants_of_all_runs(tmp_path):

@@ -1,18 +1,30 @@
 """What is malformed is refused with one sentence, never with a traceback and never with a wild answer."""
 
+import math
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from fusion import (
+    BeliefError,
+    Covariance,
     MeasurementError,
     MotorCommand,
     Odometry,
+    Pose,
+    Prior,
     RangeReading,
     Ranges,
     Reason,
+    Tag,
     WheelTicks,
     World,
     WorldError,
     build,
+    digest,
+    load,
+    names,
     track,
 )
 from fusion.drive import Drive
@@ -68,3 +80,51 @@ def test_encoder_that_starts_over_loses_one_message_and_no_more():
     ticks = [WheelTicks((i + 1) * 10**8, "wheels", i, (count, count)) for i, count in enumerate(counts)]
     driven = fold(*ticks, robot=robot)[-1].estimate.pose.x - Drive().pose(0).x
     assert driven == pytest.approx(0.3)
+
+
+START = Prior(0, Pose(1.0, 2.0, 0.5), Covariance.from_std(0.1, 0.1, 0.1))
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"pose": Pose(math.nan, 2.0, 0.5)}, "prior: x is nan, no finite number"),
+        ({"pose": Pose(1.0, -math.inf, 0.5)}, "prior: y is -inf"),
+        ({"pose": Pose(1.0, 2.0, math.nan)}, "prior: heading is nan.* heading_known=False"),
+        ({"pose": Pose(math.nan, 2.0, 0.5), "heading_known": False}, "prior: x is nan.* position_known=False"),
+        ({"pose": Pose(1.0, 2.0, None)}, "prior: heading is None"),
+        (
+            {"covariance": Covariance(0.1, math.nan, 0.0, 0.1, 0.0, 0.1)},
+            "prior: the covariance of x and y is nan, no finite number",
+        ),
+        ({"covariance": Covariance(-0.1, 0.0, 0.0, 0.1, 0.0, 0.1)}, "prior: the variance of x is -0.1, below zero"),
+        ({"covariance": Covariance(0.1, 0.2, 0.0, 0.1, 0.0, 0.1)}, "prior: x and y have a covariance of 0.2"),
+        ({"covariance": Covariance(1.0, 0.9, 0.9, 1.0, -0.9, 1.0)}, "prior: correlations of .* exclude each other"),
+        ({"covariance": np.eye(3)}, "is no fusion.Covariance; Covariance.from_matrix makes one"),
+    ],
+)
+def test_prior_that_no_estimator_could_start_from_is_refused_by_name(change, told):
+    with pytest.raises(BeliefError, match=told):
+        replace(START, **change)
+
+
+def test_prior_may_leave_open_what_is_not_known_whatever_its_numbers():
+    spoilt = Covariance(1.0, 0.0, 9.0, 1.0, 0.0, -1.0)
+    assert replace(START, covariance=spoilt, heading_known=False).covariance is spoilt
+    assert not replace(START, pose=Pose(1.0, 2.0, math.nan), heading_known=False).heading_known
+    nowhere, nothing = Pose(*[math.nan] * 3), Covariance(*[math.nan] * 6)
+    assert replace(START, pose=nowhere, covariance=nothing, position_known=False, heading_known=False).pose is nowhere
+
+
+@pytest.mark.parametrize("name", [name for name in names() if Tag.HEADING_START in load(name).tags])
+def test_estimator_that_starts_without_a_heading_reads_none_of_its_numbers(name):
+    place, start = Drive().world(), replace(Drive().prior(), heading_known=False)
+    hollow = replace(
+        start,
+        pose=start.pose._replace(heading=math.nan),
+        covariance=start.covariance._replace(xh=math.nan, yh=math.nan, hh=math.nan),
+    )
+    with_any, with_none = (
+        digest(track(build(name, place), place, Drive().measurements(), prior, seed=1)) for prior in (start, hollow)
+    )
+    assert with_any == with_none

@@ -33,6 +33,7 @@ class Ros:
         return self.make("geometry_msgs/msg/Vector3", x, y, z)
 
     def quaternion(self, heading):
+        """Of a heading [rad]: None is all zeros, NaN all NaN."""
         half = 0.0 if heading is None else 0.5 * heading
         zw = (0.0, 0.0) if heading is None else (math.sin(half), math.cos(half))
         return self.make("geometry_msgs/msg/Quaternion", 0.0, 0.0, *zw)

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from fusion import Gyro, Odometry, Ranges, RecordingError, WheelTicks, WifiScan
@@ -72,6 +73,47 @@ def test_start_heading_is_found_from_motion_where_the_truth_has_none(bundle):
     assert "motion" in run.metadata["prior"]
 
 
+def truth_csv(*rows):
+    return "\n".join(["time_s,x_m,y_m,heading_rad", *rows]) + "\n"
+
+
+@pytest.mark.parametrize("unknown", ["", "nan", "NaN", "-nan", " "])
+def test_heading_that_is_empty_or_no_number_is_not_known_row_by_row(bundle, unknown):
+    rows = [f"1652380260.0,1,2,{unknown}", "1652380260.1,1,2.1,1.5", f"1652380260.371842098,1,2.2,{unknown}"]
+    (bundle / "truth.csv").write_text(truth_csv(*rows), encoding="utf-8")
+    run = imported(bundle)
+    assert np.isnan(run.truth.heading).tolist() == [True, False, True]
+    assert run.truth.heading[1] == pytest.approx(1.5, abs=1e-15)
+    assert run.prior.pose == pytest.approx((1.0, 2.0, math.pi / 2))
+    assert "motion" in run.metadata["prior"]
+    assert run.warnings == ()
+
+
+def test_start_without_heading_or_motion_is_a_known_place_and_a_uniform_heading(bundle):
+    (bundle / "odometry.csv").unlink()
+    (bundle / "truth.csv").write_text(truth_csv("1652380260.0,1,2,nan"), encoding="utf-8")
+    prior = imported(bundle).prior
+    assert (prior.position_known, prior.heading_known, prior.pose[:2]) == (True, False, (1.0, 2.0))
+    assert prior.covariance.hh == pytest.approx(math.tau**2 / 12.0)
+
+
+def test_rows_without_a_position_are_left_out_counted_and_no_start(bundle, capsys):
+    rows = ["1652380260.0,,2,0.5", "1652380260.1,1,NaN,0.5", "1652380260.2,1,2.1,", "1652380260.371842098,1,2.2,"]
+    (bundle / "truth.csv").write_text(truth_csv(*rows), encoding="utf-8")
+    run = imported(bundle)
+    assert run.truth.y.tolist() == [2.1, 2.2]
+    assert (run.prior.time_ns, run.prior.pose[:2], run.prior.heading_known) == (1652380260200000000, (1.0, 2.1), True)
+    assert "2 of 4 true poses have no position, and are left out" in run.warnings[0]
+    assert "warning: walk: 2 of 4 true poses have no position, and are left out" in capsys.readouterr().err
+
+
+def test_truth_without_any_position_is_none(bundle):
+    (bundle / "truth.csv").write_text(truth_csv("1652380260.0,nan,nan,0.5", "1652380260.1,,,0.5"), encoding="utf-8")
+    run = imported(bundle)
+    assert (run.truth, run.prior) == (None, None)
+    assert "none of the 2 true poses has a position, so there is no ground truth" in run.warnings[0]
+
+
 @pytest.mark.parametrize("name", [name for name in FILES if name != "world.toml"])
 def test_any_table_may_be_missing(bundle, name):
     (bundle / name).unlink()
@@ -85,6 +127,13 @@ def test_any_table_may_be_missing(bundle, name):
         ("ranges.csv", "time_s,anchor,range_m\n1,a,2\n2,a,far\n", r"ranges\.csv:3: range_m is 'far'"),
         ("gyro.csv", "time_s,rate_rad_s\nnoon,2\n", r"gyro\.csv:2: time_s"),
         ("gyro.csv", "time_s,rate_rad_s\n1\n", r"gyro\.csv:2: rate_rad_s"),
+        (
+            "truth.csv",
+            truth_csv("1,2,3,inf"),
+            r"truth\.csv:2: heading_rad is 'inf', not a finite number; leave it empty",
+        ),
+        ("truth.csv", truth_csv("1,2,3,0", "2,-inf,3,0"), r"truth\.csv:3: x_m is '-inf', not a finite number"),
+        ("truth.csv", truth_csv("1,2,3,north"), r"truth\.csv:2: heading_rad is 'north', not a number"),
         ("ticks.csv", "time_s,left,right\n1,nan,2\n", r"ticks\.csv:2: left is 'nan', not a whole number"),
     ],
 )

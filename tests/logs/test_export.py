@@ -4,6 +4,7 @@ import csv
 import math
 import tomllib
 
+import numpy as np
 import pytest
 
 from fusion import (
@@ -31,6 +32,7 @@ T = 1_652_380_260_171_842_098
 WORLD = World.from_table(
     {"name": "here", "anchors": [{"id": "ä, b", "position_m": [0, 0]}, {"id": "c", "position_m": [1, 0.1]}]}
 )
+WORLD_TOML = '[[anchors]]\nid = "c"\nposition_m = [0, 0]\n'
 MEASUREMENTS = (
     Odometry(T, "odometry", 0, T - 10, 0.1 + 0.2, -1e-17),
     WheelTicks(T + 1, "ticks", 0, (1, -2, 3, 4)),
@@ -88,8 +90,34 @@ def test_tracks_are_tum_lines_in_time_order(log, tmp_path):
     time_s, x, y, z, *quaternion = files["ekf"][0].split(" ")
     assert (time_s, float(x), float(y), float(z)) == ("1652380260.171842098", 1.0, 2.0, 0.0)
     assert [float(q) for q in quaternion] == pytest.approx([0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)])
-    assert files["truth"][1] == "1652380260.171842108 0.5 2.0 0.0 0.0 0.0 0.0 1.0"
+    assert files["truth"][1] == "1652380260.171842108 0.5 2.0 0.0 0.0 0.0 0.0 0.0", "no rotation: no known heading"
     assert files["ekf"] == sorted(files["ekf"])
+
+
+def test_bundle_keeps_the_rows_whose_heading_is_not_known(tmp_path):
+    rows = ["1.0,1.0,2.0,nan", "2.0,1.5,2.0,0.5", "3.0,2.0,2.0,", "4.0,,2.0,0.5"]
+    for name, text in (("truth.csv", "time_s,x_m,y_m,heading_rad\n" + "\n".join(rows)), ("world.toml", WORLD_TOML)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    (tmp_path / "gyro.csv").write_text("time_s,rate_rad_s\n1.0,0.1\n", encoding="utf-8")
+    (first,) = import_recordings("csv", tmp_path, tmp_path / "first.mcap")
+    export_csv(first, tmp_path / "bundle")
+    (again,) = import_recordings("csv", tmp_path / "bundle", tmp_path / "again.mcap")
+    before, after = read_run(first), read_run(again)
+    assert np.isnan(after.truth.heading).tolist() == [True, False, True]
+    for name in ("time_ns", "x", "y", "heading"):
+        np.testing.assert_allclose(getattr(after.truth, name), getattr(before.truth, name), atol=1e-15)
+    assert (after.prior, after.warnings) == (before.prior, ())
+
+
+def test_track_whose_heading_is_not_known_has_no_rotation(tmp_path):
+    with RunWriter(tmp_path / "run.mcap", WORLD, name="run") as writer:
+        for i, known in enumerate((True, False)):
+            estimate = Estimate(T + i, Pose(1.0, 2.0, 0.5), None, heading_known=known)
+            writer.write_update("ekf", Update(MEASUREMENTS[0], estimate, ()))
+    (path,) = export_tum(tmp_path / "run.mcap", tmp_path / "tracks")
+    known, unknown = (line.split()[4:] for line in path.read_text().splitlines())
+    assert [float(q) for q in known] == pytest.approx([0.0, 0.0, math.sin(0.25), math.cos(0.25)])
+    assert unknown == ["0.0"] * 4
 
 
 def test_track_holds_the_last_word_on_every_time(tmp_path):

@@ -4,6 +4,7 @@ import builtins
 import json
 import math
 
+import numpy as np
 import pytest
 from mcap.writer import Writer
 
@@ -142,7 +143,6 @@ def test_truth_keeps_every_digit_and_a_missing_rotation_is_no_heading(tmp_path, 
         ("json", b"not json"),
         ("json", b'{"frame_id": "map"}'),
         ("json", b'{"timestamp": {"sec": 1, "nsec": 0}, "frame_id": "", "pose": {"position": {"x": null, "y": 0}}}'),
-        ("json", b'{"timestamp": {"sec": 1, "nsec": 0}, "frame_id": "", "pose": {"position": {"x": NaN, "y": 0}}}'),
         ("protobuf", b"\xff\xff"),
     ],
 )
@@ -152,6 +152,24 @@ def test_message_that_says_nothing_is_counted(tmp_path, encoding, damaged):
     run = read_bag(path, WORLD, {"truth": "/pose"})
     assert run.truth.time_ns.tolist() == [T]
     assert "1 messages of /pose cannot be decoded" in run.warnings[0]
+
+
+def test_pose_without_a_position_is_counted_and_one_without_a_rotation_has_no_heading(tmp_path):
+    kind = "foxglove.PoseInFrame"
+    rotation = {"x": math.nan, "y": 0.0, "z": 0.0, "w": 1.0}
+    odd = [
+        {
+            "timestamp": {"sec": 1, "nsec": i},
+            "frame_id": "",
+            "pose": {"position": {"x": x, "y": 0}, "orientation": rotation},
+        }
+        for i, x in enumerate((math.nan, 2.0))
+    ]
+    packed = [*(json.dumps(message).encode() for message in odd), json_message(kind, T)]
+    run = read_bag(written(tmp_path / "run.mcap", "json", kind, *packed), WORLD, {"truth": "/pose"})
+    assert run.truth.x.tolist() == [2.0, 1.1]
+    assert np.isnan(run.truth.heading).tolist() == [True, False]
+    assert "1 of 3 true poses have no position" in run.warnings[0]
 
 
 def test_pose_packed_in_another_way_is_refused(tmp_path):

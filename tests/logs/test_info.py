@@ -1,6 +1,7 @@
 """`fusion info`: what is in a log, in words and as JSON."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -65,6 +66,23 @@ def test_text_names_world_hash_late_stamps_and_what_is_missing(log, capsys):
     assert "longest gap 2.00 s, 1 out of order, 10.000 s late, at most 11.000 s" in text
     assert "truth: none" in text
     assert "start: position unknown, heading 28.6°" in text
+
+
+@pytest.mark.parametrize(
+    ("headings", "told"),
+    [
+        ((0.5, 0.5), "2 poses"),
+        ((0.5, None), "2 poses, the heading known at 1 of them"),
+        ((None, math.nan), "2 poses, the heading known at none of them"),
+    ],
+)
+def test_true_headings_are_counted(tmp_path, capsys, headings, told):
+    with RunWriter(tmp_path / "run.mcap", WORLD, name="walk") as writer:
+        writer.write(Gyro(0, "g", 0, 0.0))
+        for i, heading in enumerate(headings):
+            writer.write_truth(Truth(i, 1.0, 2.0, heading))
+    assert main(["info", str(tmp_path / "run.mcap")]) == 0
+    assert f"truth: {told}\n" in capsys.readouterr().out
 
 
 def test_cut_off_log_is_described_with_its_warning(log, capsys):

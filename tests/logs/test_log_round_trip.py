@@ -1,8 +1,12 @@
 """What goes into a log comes out of it, to the bit, and a damaged one says so."""
 
 import json
+import math
+import struct
 
+import numpy as np
 import pytest
+from mcap.records import Message
 
 from fusion import (
     Covariance,
@@ -23,6 +27,7 @@ from fusion import (
 from logs.export import export_csv
 from logs.importing import import_recordings
 from logs.info import describe
+from logs.messages import PRIOR, encode_prior
 from logs.reader import read_run
 from logs.writer import RunWriter
 
@@ -63,6 +68,37 @@ def test_every_value_comes_back_as_it_was(tmp_path):
     assert str(run.truth.heading[0]) == "nan"
     assert run.metadata["note"] == "x"
     assert run.warnings == ()
+
+
+def test_truth_keeps_every_unknown_heading_and_counts_unknown_positions(tmp_path):
+    truths = [Truth(1, 1.0, 0.0, 0.5), Truth(2, 2.0, 0.0), Truth(3, 3.0, 0.0, math.nan), Truth(4, math.nan, 0.0, 0.5)]
+    with RunWriter(tmp_path / "run.mcap", WORLD, name="test") as log:
+        for truth in truths:
+            log.write_truth(truth)
+        log.write(EVERY_KIND[0])
+    run = read_run(tmp_path / "run.mcap")
+    assert run.truth.x.tolist() == [1.0, 2.0, 3.0]
+    assert np.isnan(run.truth.heading).tolist() == [False, True, True]
+    assert run.warnings == (f"{tmp_path / 'run.mcap'}: 1 of 4 true poses have no position, and are left out",)
+
+
+@pytest.mark.parametrize(
+    ("written", "spoilt"),
+    [(3.0, math.nan), (4.0, math.inf), (0.25, -0.25)],
+    ids=["a position that is no number", "one that is infinite", "a variance below zero"],
+)
+def test_prior_of_an_older_log_that_no_estimator_could_start_from_is_left_out(tmp_path, written, spoilt):
+    """Logs used to keep them, and every estimator then answered NaN."""
+    sound = Prior(SECOND, Pose(3.0, 4.0, 0.5), Covariance(0.25, 0.0, 0.0, 0.5, 0.0, 0.01))
+    data, about = encode_prior(sound)
+    data = data.replace(struct.pack("<d", written), struct.pack("<d", spoilt))
+    with RunWriter(tmp_path / "old.mcap", WORLD, name="test", metadata=about) as log:
+        log.copy(*PRIOR, Message(channel_id=0, log_time=SECOND, data=data, publish_time=SECOND, sequence=0))
+        log.write(EVERY_KIND[0])
+    run = read_run(tmp_path / "old.mcap")
+    assert run.prior is None
+    (warning,) = run.warnings
+    assert "its starting prior is left out (prior: " in warning
 
 
 def test_file_cut_anywhere_opens_with_a_warning_or_says_what_it_is(tmp_path):

@@ -250,10 +250,37 @@ def test_truth_of_every_type_is_moved_into_the_map(tmp_path, ros, kind):
     assert (still.truth.x[0], still.truth.y[0], still.metadata["topics"]) == (1.0, 2.0, f"truth={topic}")
 
 
-def test_pose_without_rotation_is_truth_without_heading(tmp_path, ros):
-    run = read_bag(ros.bag(tmp_path / "bag", [("/gt", SECOND, ros.pose(SECOND, 1.0, 2.0))]), WORLD, {"truth": "/gt"})
-    assert math.isnan(run.truth.heading[0])
-    assert not run.prior.heading_known
+@pytest.mark.parametrize("unknown", [None, math.nan])
+@pytest.mark.parametrize("kind", ["pose", "pose_with_covariance", "odometry", "transforms"])
+def test_pose_without_rotation_is_truth_without_heading_row_by_row(tmp_path, ros, kind, unknown):
+    def message(t, heading):
+        if kind == "transforms":
+            return ros.transforms((t * SECOND, "map", "base_link", 1.0 * t, 2.0, heading))
+        return getattr(ros, kind)(t * SECOND, 1.0 * t, 2.0, heading)
+
+    rows = [("/gt", t * SECOND, message(t, heading)) for t, heading in ((1, unknown), (2, 0.5), (3, unknown))]
+    topic = "tf:map>base_link" if kind == "transforms" else "/gt"
+    run = read_bag(ros.bag(tmp_path / "bag", rows), WORLD, {"truth": topic, "odom": "none"})
+    assert run.truth.x.tolist() == [1.0, 2.0, 3.0]
+    assert np.isnan(run.truth.heading).tolist() == [True, False, True]
+    assert run.truth.heading[1] == pytest.approx(0.5, abs=1e-15)
+    assert (run.prior.position_known, run.prior.heading_known) == (True, False)
+    assert run.warnings == (f"{tmp_path / 'bag'}: holds no measurements",)
+
+
+@pytest.mark.parametrize("unknown", [None, math.nan])
+def test_odometry_without_orientation_is_not_chained_and_counted(tmp_path, ros, unknown):
+    poses = [(t, x, y, unknown if t == 2 else heading) for t, x, y, heading in POSES]
+    rows = [("/odom", t * SECOND, ros.odometry(t * SECOND, x, y, heading)) for t, x, y, heading in poses]
+    run = read_bag(ros.bag(tmp_path / "some", rows), WORLD)
+    first, last = of(run, Odometry)
+    assert (first.from_ns, first.time_ns, last.from_ns) == (SECOND, 3 * SECOND, 3 * SECOND)
+    assert first.turn_rad == pytest.approx(math.pi / 2)
+    assert any("/odom: 1 of 4 poses lack heading or position, and are left out" in told for told in run.warnings)
+    blind = [("/odom", t * SECOND, ros.odometry(t * SECOND, x, y, unknown)) for t, x, y, _ in POSES]
+    none = read_bag(ros.bag(tmp_path / "none", [*blind, ("/imu", SECOND, ros.imu(SECOND, 0.1))]), WORLD)
+    assert of(none, Odometry) == []
+    assert any("/odom: 4 of 4 poses lack heading" in told for told in none.warnings)
 
 
 def test_truth_is_never_guessed_and_its_candidates_are_told(tmp_path, ros, drive):
@@ -329,7 +356,7 @@ def test_pose_that_is_not_finite_is_no_truth(tmp_path, ros):
     rows = [("/gt", t * SECOND, ros.pose(t * SECOND, x, 0.0)) for t, x in ((1, 1.0), (2, math.nan), (3, 3.0))]
     run = read_bag(ros.bag(tmp_path / "bag", rows), WORLD, {"truth": "/gt"})
     assert run.truth.x.tolist() == [1.0, 3.0]
-    assert "1 messages of /gt cannot be decoded" in run.warnings[0]
+    assert any("1 of 3 true poses have no position, and are left out" in told for told in run.warnings)
 
 
 def test_stamps_that_were_never_set_are_told(tmp_path, ros):

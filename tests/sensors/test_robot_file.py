@@ -54,6 +54,9 @@ def test_a_world_may_stand_in_a_file_beside_it_or_in_the_file_itself(tmp_path):
         (("[[sensors]]", "[[sensor]]"), "did you mean 'sensors'"),
         (('use = "simulated_gyro"\n', ""), "use is missing"),
         (("[start]", "[start"), "not TOML"),
+        (("[start]", "[start]\nposition_std_m = -0.1"), "start.position_std_m: -0.1 must not be negative"),
+        (("[start]", "[start]\nheading_std_deg = -1.0"), "start.heading_std_deg: -1.0 must not be negative"),
+        (("[start]", "[start]\nposition_std_m = 1e200"), "start: prior: the variance of x is inf"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path, change, told):

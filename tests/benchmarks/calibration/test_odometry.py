@@ -21,6 +21,7 @@ from benchmarks.calibration.umbmark import umbmark
 from benchmarks.calibration.wheels import wheels
 from fusion import LogError, Odometry, Pose
 from fusion.odometry import Odometer
+from fusion.values import nanoseconds
 from fusion.world import Robot
 from logs.run import TruthTrack
 
@@ -149,6 +150,18 @@ def test_the_papers_line_is_the_scale_of_the_straight_moves(drive):
     trend = linear_trend(rolled(find_segments(run, 0, told), [told], run.world.robot))
     assert trend.scale.holds(1.0 / 1.05)
     assert trend.offset_m.holds(0.0)
+
+
+def test_piece_whose_heading_is_not_known_all_the_way_is_none_and_no_whole_turn_is_lost(drive):
+    run = drive()
+    turns = [each for each in find_segments(run, 0, wheels(run)) if abs(each.turn_rad) > 3.0]
+    middle = (turns[0].from_ns + turns[0].until_ns) // 2
+    for reach_s, kept in ((0.2, True), (1.0, False)):
+        hidden = np.abs(run.truth.time_ns - middle) < nanoseconds(reach_s)
+        heading = np.where(hidden, np.nan, run.truth.heading)
+        partly = dataclasses.replace(run, truth=dataclasses.replace(run.truth, heading=heading))
+        found = [each for each in find_segments(partly, 0, wheels(run)) if each.from_ns <= middle <= each.until_ns]
+        assert [each.turn_rad == pytest.approx(turns[0].turn_rad, abs=1e-6) for each in found] == [True] * kept
 
 
 def test_truth_without_headings_is_good_enough(drive):

@@ -37,7 +37,7 @@ def files(tmp_path, write_tum):
 
 @pytest.fixture
 def pair(files):
-    true = read_truth(files[0])
+    true, _ = read_truth(files[0])
     instants = Instants(true.time_ns, true.x, true.y, true.heading)
     return instants, match(instants, read_track(files[1]))
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.instants import evaluation_instants, interpolate_truth, known_truth, match
 from benchmarks.metrics.track import Track
 from fusion import Covariance, Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, Update
 from fusion.track import order
@@ -61,6 +61,14 @@ def test_heading_is_interpolated_along_the_shortest_arc():
 def test_unknown_heading_of_a_neighbour_does_not_spoil_a_known_one():
     instants = evaluation_instants(truth_at(np.arange(3) * SECOND // 10, heading=[0.5, math.nan, 0.7]))
     np.testing.assert_array_equal(instants.heading, [0.5, math.nan, 0.7])
+
+
+def test_heading_between_two_stamps_is_known_only_if_both_are():
+    known = known_truth(truth_at(np.arange(4) * SECOND, heading=[0.5, 0.7, math.nan, 0.9]))
+    between, kept = interpolate_truth(known, np.array([SECOND // 2, 3 * SECOND // 2, 5 * SECOND // 2]), gap_s=2.0)
+    np.testing.assert_allclose(between.heading, [0.6, math.nan, math.nan])
+    assert kept.all()
+    assert np.isfinite(between.x).all()
 
 
 def test_truth_that_is_nowhere_finite_gives_no_instants():

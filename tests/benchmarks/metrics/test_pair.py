@@ -31,7 +31,7 @@ GOLDEN = {
 
 def paired(truth, estimate):
     """Pose k with pose k, whatever their stamps."""
-    true, said = read_truth(truth), read_track(estimate)
+    (true, _), said = read_truth(truth), read_track(estimate)
     ages = np.zeros(len(true)), np.full(len(true), np.nan)
     answers = Answers(said.usable, *said.pose[:, :2].T, said.heading, said.covariance, *ages)
     return Instants(true.time_ns, true.x, true.y, true.heading), answers

@@ -157,6 +157,20 @@ def test_truth_without_heading_asks_for_none():
     scores = scores_of(oracle_updates(), blind)
     assert scores["anees"] == pytest.approx(1.70420466671, rel=1e-9)
     assert math.isnan(scores["head_mae"])
+    assert scores["head_n"] == 0.0
+
+
+def test_heading_errors_are_of_the_instants_whose_true_heading_is_known_and_counted():
+    off = HEADING + 1.0
+    off[::2] = HEADING[::2]
+    updates = oracle_updates()
+    whole, lying = scores_of(updates), scores_of(updates, TruthTrack(TRUTH.time_ns, X, Y, off))
+    known = np.where(np.arange(1000) % 2 == 0, HEADING, np.nan)
+    half = scores_of(updates, TruthTrack(TRUTH.time_ns, X, Y, known))
+    assert (whole["head_n"], half["head_n"]) == (1000.0, 500.0)
+    assert lying["head_rmse"] > 0.5
+    assert half["head_rmse"] == pytest.approx(whole["head_rmse"], rel=0.05)
+    assert half["pos_rmse"] == whole["pos_rmse"]
 
 
 def test_no_covariance_claimed_means_no_consistency_figure():

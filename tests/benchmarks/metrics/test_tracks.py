@@ -73,23 +73,58 @@ def test_heading_of_a_tilted_robot_is_its_yaw_and_a_quaternion_may_have_any_leng
 
 
 def test_csv_may_leave_headings_empty_or_out(tmp_path):
-    some = read_truth(write(tmp_path / "a.csv", "time_s,x_m,y_m,heading_rad", "0.5,1,2,", "1.5,3,4,0.25", "2.5,5,6,"))
-    assert some.time_ns.tolist() == [500_000_000, 1_500_000_000, 2_500_000_000]
-    np.testing.assert_array_equal(some.heading, [math.nan, 0.25, math.nan])
-    none = read_truth(write(tmp_path / "b.csv", "time_s,x_m,y_m", "0.5,1,2"))
+    rows = ("0.5,1,2,", "1.5,3,4,0.25", "2.5,5,6,", "3.5,7,8,NaN")
+    some, warnings = read_truth(write(tmp_path / "a.csv", "time_s,x_m,y_m,heading_rad", *rows))
+    assert some.time_ns.tolist() == [500_000_000, 1_500_000_000, 2_500_000_000, 3_500_000_000]
+    np.testing.assert_array_equal(some.heading, [math.nan, 0.25, math.nan, math.nan])
+    assert warnings == ()
+    none, _ = read_truth(write(tmp_path / "b.csv", "time_s,x_m,y_m", "0.5,1,2"))
     assert np.isnan(none.heading).all()
     (tmp_path / "c.csv").write_bytes(b"time_s,x_m,y_m,heading_rad\r\n0.5,1,2,\r\n1,1,2,")
-    assert np.isnan(read_truth(tmp_path / "c.csv").heading).all()
+    assert np.isnan(read_truth(tmp_path / "c.csv")[0].heading).all()
+
+
+@pytest.mark.parametrize("rotation", ["0 0 0 0", "nan nan nan nan", "0 0 NaN 1"])
+def test_tum_heading_of_a_quaternion_that_is_none_is_not_known(tmp_path, rotation):
+    path = write(tmp_path / "a.tum", f"0.5 1 2 0 {rotation}", "1.5 3 4 0 0 0 0 1")
+    track = read_track(path)
+    np.testing.assert_array_equal(track.heading, [math.nan, 0.0])
+    assert track.heading_known.tolist() == [False, True]
+    assert track.is_sound
+    np.testing.assert_array_equal(read_truth(path)[0].heading, [math.nan, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "lines"),
+    [
+        ("a.csv", ["time_s,x_m,y_m,heading_rad", "0,,,", "1,1,2,0.5", "2,nan,2,0.5", "3,3,4,"]),
+        ("a.csv", ["time_s,x_m,y_m", "0,,", "1,1,2", "2,2,", "3,3,4"]),
+        ("a.tum", ["0 nan nan nan 0 0 0 1", "1 1 2 0 0 0 0 1", "2 NaN 2 0 0 0 0 1", "3 3 4 0 0 0 0 0"]),
+    ],
+)
+def test_true_poses_without_a_position_are_left_out_and_counted(tmp_path, name, lines):
+    truth, warnings = read_truth(write(tmp_path / name, *lines))
+    assert (truth.x.tolist(), truth.y.tolist()) == ([1.0, 3.0], [2.0, 4.0])
+    assert warnings == (f"{tmp_path / name}: 2 of 4 true poses have no position, and are left out",)
+    with pytest.raises(LogError, match="pose 1 holds no position; remove the row"):
+        read_track(tmp_path / name)
+
+
+def test_truth_without_any_position_is_none(tmp_path):
+    with pytest.raises(LogError, match=r"none of the 2 true poses has a position.*holds no ground truth"):
+        read_truth(write(tmp_path / "a.csv", CSV, "0,nan,1,0", "1,,2,0"))
 
 
 def test_what_a_log_exports_is_read_back(tmp_path):
     log = log_at(tmp_path / "run.mcap", "ekf")
-    truth = read_truth(log)
+    truth, _ = read_truth(log)
     export_csv(log, tmp_path / "csv")
     export_tum(log, tmp_path / "tum")
-    back = read_truth(tmp_path / "csv" / "truth.csv")
+    back, _ = read_truth(tmp_path / "csv" / "truth.csv")
+    turned, _ = read_truth(tmp_path / "tum" / "truth.tum")
     for name in ("time_ns", "x", "y", "heading"):
         np.testing.assert_array_equal(getattr(back, name), getattr(truth, name))
+        np.testing.assert_allclose(getattr(turned, name), getattr(truth, name), atol=1e-15)
     assert read_track(tmp_path / "tum" / "ekf.tum").time_ns.tolist() == np.delete(truth.time_ns, 1).tolist()
 
 
@@ -111,21 +146,21 @@ TUM, CSV = "0 0 0 0 0 0 0 1", "time_s,x_m,y_m,heading_rad"
     [
         ("a.tum", [TUM, "1 0 0 0 0 0 1"], "is not a table of time x y z qx qy qz qw"),
         ("a.tum", [TUM, "1 0 0 0 0 0 0 one"], "is not a table of time"),
-        ("a.tum", [TUM, "1 0 nan 0 0 0 0 1"], "pose 2 holds a number that is not finite"),
-        ("a.tum", [TUM, "1 0 0 0 inf 0 0 1"], "pose 2 holds a number that is not finite"),
+        ("a.tum", [TUM, "1 0 nan 0 0 0 0 1"], "pose 2 holds no position"),
+        ("a.tum", [TUM, "1 0 0 0 inf 0 0 1"], "pose 2 holds a number that is infinite"),
         ("a.tum", [TUM, "nan 0 0 0 0 0 0 1"], "'nan' is not a time in seconds"),
         ("a.tum", [TUM, "1..5 0 0 0 0 0 0 1"], "is not a time in seconds"),
         ("a.tum", [TUM, "1652380260171842098 0 0 0 0 0 0 1"], "no time in seconds; divide"),
         ("a.tum", [TUM, "1.00000000000000000000000000000e3 0 0 0 0 0 0 1"], "32 characters or more"),
         ("a.tum", [TUM, "2 0 0 0 0 0 0 1", "1 0 0 0 0 0 0 1"], "pose 3 is not later than the one before"),
         ("a.tum", [TUM, TUM], "pose 2 is not later"),
-        ("a.tum", ["0 0 0 0 0 0 0 0"], "pose 1 has a quaternion of zeros"),
         ("a.tum", ["# nothing"], "holds no pose"),
         ("a.csv", ["t,x,y", "0,0,0"], "the first line must be time_s,x_m,y_m,heading_rad"),
         ("a.csv", [CSV, "0,0,0"], "is not a table of time_s,x_m,y_m,heading_rad"),
-        ("a.csv", [CSV, "0,,0,0"], "is not a table"),
-        ("a.csv", [CSV, "0,nan,0,0"], "pose 1 holds a position that is not finite"),
-        ("a.csv", [CSV, "0,0,0,inf"], "pose 1 holds a heading that is infinite"),
+        ("a.csv", [CSV, "0,,0,0"], "pose 1 holds no position"),
+        ("a.csv", [CSV, ",0,0,0"], "'' is not a time"),
+        ("a.csv", [CSV, "0,nan,0,0"], "pose 1 holds no position"),
+        ("a.csv", [CSV, "0,0,0,inf"], "pose 1 holds a number that is infinite"),
         ("a.csv", [CSV], "holds no pose"),
     ],
 )

@@ -180,6 +180,17 @@ def test_time_counts_from_the_first_message_and_errors_are_those_of_the_bench(tm
     assert np.allclose(np.ravel(errors), 0.5)
 
 
+def test_true_heading_is_drawn_only_while_it_is_known(tmp_path):
+    run = run_of(tmp_path)
+    heading = run.truth.heading.copy()
+    heading[[0, 4]] = np.nan
+    partly = replace(run, truth=replace(run.truth, heading=heading))
+    (scene,) = write_scene(tmp_path / "review.rrd", partly, *scored(partly, ["toy"]))
+    time, vectors = column(chunks_of(scene), "/map/truth/heading", "vectors")
+    assert len(time) == len(heading)
+    assert [len(row) for row in vectors] == np.isfinite(heading).astype(int).tolist()
+
+
 def test_weights_are_one_series_per_anchor(tmp_path):
     _, weights = column(review_of(tmp_path, "toy"), "/weight/toy/b", "Scalars")
     assert np.ravel(weights).tolist() == [1.0, 0.0] * 4 + [1.0]
