@@ -19,6 +19,7 @@ from fusion.driver import (
     Said,
     VirtualClock,
 )
+from fusion.epochs import Epoch
 from fusion.errors import (
     BusyError,
     ConformanceError,
@@ -41,11 +42,13 @@ from fusion.errors import (
     WorldError,
 )
 from fusion.estimator import Estimator, ParticleEstimator, Particles, Tag, generator
+from fusion.fold import Fold, Update
 from fusion.geometry import Covariance, Pose, wrap_angle
-from fusion.motion import Increment, compose
+from fusion.motion import Increment, Move, compose, move
 from fusion.plugins import build, load, names, registered
 from fusion.sighting import Sighting, sightings
-from fusion.track import Tracker, Update, final, track
+from fusion.timeline import Moment, Timeline
+from fusion.track import Tracker, final, track
 from fusion.values import (
     Decision,
     Estimate,
@@ -55,6 +58,7 @@ from fusion.values import (
     MotorCommand,
     Odometry,
     Prior,
+    Radio,
     RangeReading,
     Ranges,
     Reason,
@@ -83,10 +87,12 @@ __all__ = [
     "Driver",
     "DriverError",
     "DriverSpec",
+    "Epoch",
     "Estimate",
     "Estimator",
     "FakeDevice",
     "Fate",
+    "Fold",
     "Found",
     "FusionError",
     "Gyro",
@@ -95,7 +101,9 @@ __all__ = [
     "LogError",
     "Measurement",
     "MeasurementError",
+    "Moment",
     "MotorCommand",
+    "Move",
     "Needs",
     "NotFoundError",
     "NotPermittedError",
@@ -108,6 +116,7 @@ __all__ = [
     "Pose",
     "Prior",
     "ProtocolError",
+    "Radio",
     "RangeReading",
     "Ranges",
     "Reason",
@@ -120,6 +129,7 @@ __all__ = [
     "Sighting",
     "SuiteError",
     "Tag",
+    "Timeline",
     "Tracker",
     "Truth",
     "UnsupportedError",
@@ -136,6 +146,7 @@ __all__ = [
     "final",
     "generator",
     "load",
+    "move",
     "names",
     "registered",
     "sightings",

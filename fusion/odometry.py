@@ -1,9 +1,8 @@
 """From wheel ticks, motor commands and gyro to odometry increments, once for every estimator.
 
-The host folds every measurement through `Odometer.advance`. Estimators therefore meet one kind of motion,
-`Odometry`, and it always reaches up to the radio reading that follows it: where a reading falls between two odometry
-messages, the last twist is held up to it, and the part held is taken off when the real increment arrives, so motion
-counts exactly once.
+The front end of the host folds every measurement of motion through `Odometer.advance`, and holds the last twist up to
+a radio reading that falls between two odometry messages (`Odometer.hold`). The part held is taken off when the real
+increment arrives, so motion counts exactly once.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 
 from fusion.errors import MeasurementError
 from fusion.geometry import wrap_angle
-from fusion.values import Gyro, Measurement, MotorCommand, Odometry, WheelTicks, nanoseconds, seconds
+from fusion.values import Gyro, Motion, MotorCommand, Odometry, WheelTicks, nanoseconds, seconds
 from fusion.world import DRIVES, Robot
 
 MAX_HOLD_NS = nanoseconds(0.5)
@@ -139,23 +138,20 @@ class Odometer:
         """Motion is accounted for from ``time_ns`` on; no increment that ends by then may be handed to `advance`."""
         return OdometerState(start_ns=time_ns, covered_ns=time_ns, last_ns=time_ns)
 
-    def advance(self, state: OdometerState, measurement: Measurement) -> tuple[OdometerState, tuple[Measurement, ...]]:
-        """The measurements an estimator should see in place of ``measurement``, in order.
+    def advance(self, state: OdometerState, measurement: Motion) -> tuple[OdometerState, tuple[Odometry, ...]]:
+        """The state after a measurement of motion, and the increments that it brought, in order.
 
-        Raises `MeasurementError` when it tells of more or fewer wheels than the robot has.
+        Raises `MeasurementError` when it is of more or fewer wheels than the robot has.
         """
         if isinstance(measurement, Odometry):
             return self._real(state, measurement)
         if isinstance(measurement, WheelTicks):
             return self._ticks(state, measurement)
-        if isinstance(measurement, MotorCommand):
-            self._require_wheels(len(measurement.wheel_speeds_m_s), measurement)
-            forward = tuple(-1 if speed < 0.0 else 1 for speed in measurement.wheel_speeds_m_s)
-            return state._replace(forward=forward), ()
         if isinstance(measurement, Gyro):
-            return self._gyro(state, measurement)
-        state, motion = self.hold(state, measurement.time_ns)
-        return state, (*motion, measurement)
+            return self._gyro(state, measurement), ()
+        self._require_wheels(len(measurement.wheel_speeds_m_s), measurement)
+        forward = tuple(-1 if speed < 0.0 else 1 for speed in measurement.wheel_speeds_m_s)
+        return state._replace(forward=forward), ()
 
     def _require_wheels(self, count: int, measurement: WheelTicks | MotorCommand) -> None:
         wheels = DRIVES[self.robot.drive]
@@ -230,13 +226,13 @@ class Odometer:
             counted, Odometry(ticks.time_ns, ticks.sensor, ticks.seq, state.last_ns, distance, wrap_angle(turn))
         )
 
-    def _gyro(self, state: OdometerState, gyro: Gyro) -> tuple[OdometerState, tuple[Measurement, ...]]:
+    def _gyro(self, state: OdometerState, gyro: Gyro) -> OdometerState:
         if self.robot.turn_source != "gyro":
-            return state, (gyro,)
+            return state
         rate, before = self.robot.gyro_scale * (gyro.rate_rad_s - self.robot.gyro_bias_rad_s), state.gyro
         if before is None:
             first = _GyroAngle(gyro.time_ns, 0.0, rate)
-            return state._replace(gyro=first, gyro_angle_at_last=first.at(state.last_ns)), ()
+            return state._replace(gyro=first, gyro_angle_at_last=first.at(state.last_ns))
         mean_rate = 0.5 * (before.rate + rate)
         angle = before.angle + mean_rate * seconds(gyro.time_ns - before.time_ns)
-        return state._replace(gyro=_GyroAngle(gyro.time_ns, angle, rate)), ()
+        return state._replace(gyro=_GyroAngle(gyro.time_ns, angle, rate))

@@ -120,20 +120,44 @@ def _start_ns(arrivals: Sequence[tuple[int, Measurement]]) -> int:
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Arguments of `fusion info`."""
-    parser.add_argument("runs", metavar="RUN", type=Path, nargs="+", help="a log, or a bag of another robot")
+    runs = "a log, a folder of logs, or a bag of another robot"
+    parser.add_argument("runs", metavar="RUN", type=Path, nargs="+", help=runs)
     parser.add_argument("--json", action="store_true", help="as JSON: an object, or a list of them for several files")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Tell what is in each log; one that cannot be read does not keep the others from being told."""
     told = []
-    for path in arguments.runs:
+    paths = [path for given in arguments.runs for path in _logs(given)]
+    for path in paths:
         try:
             told.append(describe(path))
         except FusionError as error:
             sys.stderr.write(f"fusion info: {error}\n")
+    several = paths != arguments.runs or len(paths) > 1
     if not arguments.json:
-        sys.stdout.write("\n".join(map(info_text, told)))
-    elif told or len(arguments.runs) > 1:
-        sys.stdout.write(json.dumps(told if len(arguments.runs) > 1 else told[0], indent=2) + "\n")
-    return int(len(told) < len(arguments.runs))
+        sys.stdout.write("\n".join([*map(info_text, told), *_parts(arguments.runs, told)]))
+    elif told or several:
+        sys.stdout.write(json.dumps(told if several else told[0], indent=2) + "\n")
+    return int(len(told) < len(paths))
+
+
+def _logs(given: Path) -> list[Path]:
+    """The logs in a folder of ours; of a bag, which may be a folder of one recording, itself."""
+    inside = sorted(given.glob("*.mcap")) if given.is_dir() else []
+    return inside if any(map(_is_log, inside)) else [given]
+
+
+def _is_log(path: Path) -> bool:
+    try:
+        return holds_run(path)
+    except FusionError:
+        return False
+
+
+def _parts(given: Sequence[Path], told: Sequence[dict[str, Any]]) -> list[str]:
+    """What makes one log of them, where all are the parts of one recording."""
+    recordings = {about.get("metadata", {}).get("recording") for about in told}
+    if len(told) < 2 or len(recordings) > 1 or None in recordings:
+        return []
+    return [f"parts of one recording; one log of them: fusion join {' '.join(map(str, given))} -o RUN.mcap\n"]

@@ -22,7 +22,7 @@ from fusion import (
     World,
 )
 from fusion.errors import did_you_mean
-from fusion.track import order
+from fusion.timeline import order
 from fusion.values import NANOSECONDS
 from logs.writer import RunWriter
 
