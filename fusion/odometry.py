@@ -113,18 +113,23 @@ class OdometerState(NamedTuple):
     gyro_angle_at_last: float = 0.0
 
 
-def _twisted(state: OdometerState, own: Odometry, turn_rad: float) -> OdometerState:
-    """The state with the twist of an increment: its mean, or over `TWIST_NS` where it is too short to say."""
+class _Twist(NamedTuple):
+    """Mean speed [m/s] and turn rate [rad/s] of an increment, and the time it is a mean over."""
+
+    span_ns: int
+    speed_m_s: float
+    turn_rate_rad_s: float
+
+
+def _twist(state: OdometerState, own: Odometry, turn_rad: float) -> _Twist:
+    """The twist of an increment: its mean, or over `TWIST_NS` where it is too short to give one."""
     span_ns = own.time_ns - own.from_ns
     if span_ns >= SHORT_NS or state.span_ns == 0:
         span_s = max(seconds(span_ns), 1e-9)
-        return state._replace(span_ns=span_ns, speed_m_s=own.distance_m / span_s, turn_rate_rad_s=turn_rad / span_s)
+        return _Twist(span_ns, own.distance_m / span_s, turn_rad / span_s)
     before, span_s = 1.0 - span_ns / TWIST_NS, seconds(TWIST_NS)
-    return state._replace(
-        span_ns=TWIST_NS,
-        speed_m_s=before * state.speed_m_s + own.distance_m / span_s,
-        turn_rate_rad_s=before * state.turn_rate_rad_s + turn_rad / span_s,
-    )
+    speed_m_s = before * state.speed_m_s + own.distance_m / span_s
+    return _Twist(TWIST_NS, speed_m_s, before * state.turn_rate_rad_s + turn_rad / span_s)
 
 
 class Odometer:
@@ -197,11 +202,13 @@ class Odometer:
             turn - state.held_turn_rad,
             odometry.measured,
         )
-        state = _twisted(state, own, turn)
+        twist = _twist(state, own, turn)
         return state._replace(
             covered_ns=max(state.covered_ns, odometry.time_ns),
             last_ns=odometry.time_ns,
-            span_ns=max(state.span_ns, odometry.time_ns - odometry.from_ns),
+            span_ns=max(twist.span_ns, odometry.time_ns - odometry.from_ns),
+            speed_m_s=twist.speed_m_s,
+            turn_rate_rad_s=twist.turn_rate_rad_s,
             held_distance_m=0.0,
             held_turn_rad=0.0,
             gyro_angle_at_last=angle,
