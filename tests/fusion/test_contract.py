@@ -205,7 +205,9 @@ def test_covariance_of_a_motion_does_not_depend_on_the_message_rate(rate):
     )
     for k in range(10 * rate):
         motion = motion.extend(Odometry((k + 1) * SECOND // rate, "w", k, k * SECOND // rate, 0.3 / rate, 0.0), noise)
-    assert motion.covariance.xx == pytest.approx(noise.distance_std_per_sqrt_m**2 * 3.0 + noise.distance_std_per_sqrt_s**2 * 10.0)
+    assert motion.covariance.xx == pytest.approx(
+        noise.distance_std_per_sqrt_m**2 * 3.0 + noise.distance_std_per_sqrt_s**2 * 10.0
+    )
 
 
 @pytest.mark.parametrize("drive_", [("skid_steer", (3, 5, 3, 5)), ("differential", (3, 5))])

@@ -20,7 +20,7 @@ from benchmarks.prior import starting_prior
 from fusion import Gyro, MeasurementError, Odometry, ParameterError, Ranges, RssiReading, WheelTicks, WifiScan
 from fusion.drive import Drive
 from fusion.odometry import Odometer
-from fusion.track import order
+from fusion.timeline import order
 from fusion.values import nanoseconds, seconds
 from fusion.world import DRIVES
 from logs.run import Run

@@ -93,10 +93,10 @@ def test_estimator_that_crashes_costs_its_own_lane_and_is_told(monkeypatch):
         def start(self, prior, seed):
             raise ZeroDivisionError
 
-        def step(self, state, measurement):
+        def step(self, state, motion, scan):
             return state, ()
 
-        def estimate(self, state, time_ns):
+        def estimate(self, state, motion, time_ns):
             raise NotImplementedError
 
     with fusion.registered("broken", Broken):
