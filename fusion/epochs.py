@@ -26,7 +26,7 @@ class Longest(NamedTuple):
     leaves out is less than 5 % of the displacement.
     """
 
-    path_m: float = 20.0
+    path_m: float = 50.0
     turn_rad: float = math.tau
     duration_s: float = 30.0
 
