@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.metrics.track import Floats, Stamps, Whole
-from fusion import Measurement, Particles, Ranges, Tracker, WifiScan
+from fusion import Fold, Moment, Particles, Ranges, WifiScan
 from logs.run import Run
 
 MOST_CLOUDS, MOST_POINTS = 300, 500
@@ -30,7 +30,7 @@ class Clouds(NamedTuple):
 
 
 class CloudWatch:
-    """Looks at the particles of a tracker after each radio measurement of one run."""
+    """Looks at the particles of a fold after each radio measurement of one run."""
 
     def __init__(self, run: Run) -> None:
         radio = sum(isinstance(measurement, WifiScan | Ranges) for measurement in run.measurements)
@@ -39,13 +39,13 @@ class CloudWatch:
         self._effective_number: dict[int, float] = {}
         self._kept: dict[int, Particles] = {}
 
-    def __call__(self, tracker: Tracker, measurement: Measurement) -> None:
-        """Look, after ``measurement`` was pushed."""
-        if not isinstance(measurement, WifiScan | Ranges) or (shown := tracker.particles()) is None:
+    def __call__(self, fold: Fold, moment: Moment) -> None:
+        """Look, after ``moment`` was folded."""
+        if not isinstance(moment.measurement, WifiScan | Ranges) or (shown := fold.particles()) is None:
             return
-        self._effective_number[tracker.time_ns] = shown.effective_number
+        self._effective_number[moment.time_ns] = shown.effective_number
         if self._seen % self._every == 0:
-            self._kept[tracker.time_ns] = thinned(shown)
+            self._kept[moment.time_ns] = thinned(shown)
         self._seen += 1
 
     def clouds(self) -> Clouds | None:

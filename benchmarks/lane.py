@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TypeAlias
 
 import fusion
@@ -13,12 +13,12 @@ from benchmarks.clouds import Clouds
 from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.track import Track
 from benchmarks.prior import starting_prior
-from fusion import FusionError, Measurement, Tracker, Update
-from fusion.track import Key
+from fusion import Fold, FusionError, Moment, Timeline, Update
+from fusion.timeline import Key
 from logs.run import Run
 
-Watch: TypeAlias = Callable[[Tracker, Measurement], None]
-"""Called after every measurement; it may look, and must not touch."""
+Watch: TypeAlias = Callable[[Fold, Moment], None]
+"""Called after every moment of the run; it may look, and must not touch."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,13 @@ class Lane:
         return FateColumns.of(self.final)
 
 
+@lru_cache(maxsize=2)
+def run_moments(run: Run) -> tuple[Moment, ...]:
+    """The run as the host sees it, moment by moment: screened, in order, motion integrated once for every estimator."""
+    timeline = Timeline(run.world, starting_prior(run).time_ns)
+    return tuple(moment for measurement in run.measurements for moment in timeline.push(measurement))
+
+
 def run_lane(
     run: Run,
     estimator: str,
@@ -70,12 +77,15 @@ def run_lane(
     certificate, error, cpu_s = "", None, 0.0
     try:
         built, prior = fusion.build(estimator, run.world, options), starting_prior(run)
+        moments = run_moments(run)
         started_s = time.process_time()
-        tracker = Tracker(built, run.world, prior, seed=seed)
-        for measurement in run.measurements:
-            updates.extend(tracker.push(measurement))
+        fold = Fold(built, prior, seed)
+        for moment in moments:
+            update = fold.take(moment)
+            update.estimate  # noqa: B018 - computed now, so that the state behind it can go
+            updates.append(update)
             if watch is not None:
-                watch(tracker, measurement)
+                watch(fold, moment)
         cpu_s = time.process_time() - started_s
         # Reads every number there is, so an answer that is no number ends here and not in the scores.
         certificate = fusion.digest(updates)

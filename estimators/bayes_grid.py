@@ -27,36 +27,30 @@ from fusion import (
     Estimate,
     Fate,
     Increment,
-    Measurement,
-    Odometry,
     ParameterError,
     Particles,
     Pose,
     Prior,
-    Ranges,
-    Reason,
+    Radio,
     Sighting,
     Tag,
-    WifiScan,
     World,
     compose,
     sightings,
 )
 from fusion.belief import HEADING_KNOWN_STD
-from fusion.screen import unusable
 
 
 class State(NamedTuple):
-    """Probability of each (heading bin, x cell, y cell) with its moments, and the motion not yet applied to it;
-    ``heard_m``: how much of its path lay behind at the last reading.
+    """Probability of each (heading bin, x cell, y cell) with its moments, the motion too short to be applied to it, and
+    the path driven since the last scan.
     """
 
-    time_ns: int
     histogram: Array
     pose: Pose
     covariance: Covariance
-    motion: Increment
-    heard_m: float = 0.0
+    pending: Increment
+    path_m: float = 0.0
 
 
 class BayesGrid:
@@ -114,53 +108,51 @@ class BayesGrid:
         smoothing = np.diag([self._cell_m, self._cell_m, self._bin_rad]) / 2.0
         spread = (np.array(prior.covariance.matrix) + smoothing @ smoothing)[np.ix_(known, known)]
         exponent = np.einsum("...i,ij,...j->...", away, np.linalg.inv(spread), away)
-        return self._state(prior.time_ns, np.exp(-0.5 * (exponent - exponent.min())), Increment())
+        return self._state(np.exp(-0.5 * (exponent - exponent.min())), Increment())
 
-    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
-        """Gather motion; at a radio reading apply it if it has outgrown a cell, and multiply by the likelihood."""
-        if isinstance(measurement, Odometry):
-            motion = state.motion.extend(measurement, self._world.robot.noise)
-            return state._replace(time_ns=measurement.time_ns, motion=motion), ()
-        if isinstance(measurement, WifiScan | Ranges):
-            return self._update(state, measurement)
-        return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+    def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
+        """Apply the motion once it has outgrown a cell, and multiply by the likelihood of the readings."""
+        pending, path_m = state.pending.then(motion), state.path_m + motion.path_m
+        if scan is None:
+            return state._replace(pending=pending, path_m=path_m), ()
+        if self._has_outgrown_a_cell(pending):
+            state, pending = self._state(self._moved(state.histogram, pending), Increment()), Increment()
+        return self._weighed(state._replace(pending=pending, path_m=path_m), scan)
 
-    def estimate(self, state: State, time_ns: int) -> Estimate:
+    def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
         """Mean and covariance of the histogram, after the motion it has not yet made."""
-        pose, covariance = compose(state.pose, state.covariance, state.motion)
+        pose, covariance = compose(state.pose, state.covariance, state.pending.then(motion))
         return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
 
     def particles(self, state: State) -> Particles:
         """The cells of every heading, carried by the motion not yet made."""
-        places = carried(self._x, self._y, self._heading, state.motion)
+        places = carried(self._x, self._y, self._heading, state.pending)
         every = [np.broadcast_to(place, state.histogram.shape).ravel() for place in places]
         return Particles(np.column_stack(every), state.histogram.ravel())
 
-    def _state(self, time_ns: int, histogram: Array, motion: Increment) -> State:
+    def _state(self, histogram: Array, pending: Increment) -> State:
         """A state of normalised probabilities; within its cell a pose is uniform, hence the twelfths."""
         histogram = histogram / histogram.sum()
         pose, between = moments(histogram, self._x, self._y, self._heading)
         cell, turn = self._cell_m**2 / 12.0, self._bin_rad**2 / 12.0
         spread = between._replace(xx=between.xx + cell, yy=between.yy + cell, hh=between.hh + turn)
-        return State(time_ns, histogram, pose, spread, motion)
+        return State(histogram, pose, spread, pending)
 
-    def _update(self, state: State, scan: WifiScan | Ranges) -> tuple[State, tuple[Fate, ...]]:
-        path_m = state.motion.path_m - state.heard_m
-        if self._has_outgrown_a_cell(state.motion):
-            state = self._state(scan.time_ns, self._moved(state.histogram, state.motion), Increment())
-        pose, covariance = compose(state.pose, state.covariance, state.motion)
+    def _weighed(self, state: State, scan: Radio) -> tuple[State, tuple[Fate, ...]]:
+        """The state after the readings of a scan."""
+        pose, covariance = compose(state.pose, state.covariance, state.pending)
         histogram, fates = state.histogram, []
         for sighting in sightings(self._world, scan):
-            likelihood, good = self._likelihood(sighting, state.motion, path_m)
+            likelihood, good = self._likelihood(sighting, state.pending, state.path_m)
             share = min(float(np.sum(state.histogram * good)), 1.0)
             fates.append(judged(scan, sighting, pose, covariance, self._world.robot.antenna_m, share))
             histogram = histogram * likelihood
             histogram = histogram / histogram.sum()
-        heard = self._state(scan.time_ns, histogram, state.motion)._replace(heard_m=state.motion.path_m)
-        return heard, tuple(fates)
+        return self._state(histogram, state.pending), tuple(fates)
 
     def _has_outgrown_a_cell(self, motion: Increment) -> bool:
-        noise = max(motion.xx, motion.yy) > (0.5 * self._cell_m) ** 2 or motion.hh > (0.5 * self._bin_rad) ** 2
+        spread = motion.covariance
+        noise = max(spread.xx, spread.yy) > (0.5 * self._cell_m) ** 2 or spread.hh > (0.5 * self._bin_rad) ** 2
         return noise or math.hypot(motion.x, motion.y) >= self._cell_m or abs(motion.heading) >= self._bin_rad
 
     def _likelihood(self, sighting: Sighting, motion: Increment, path_m: float) -> tuple[Array, Array]:
@@ -181,16 +173,16 @@ class BayesGrid:
         """
         heading = self._heading[:, 0, 0]
         c, s = np.cos(heading), np.sin(heading)
-        cell, variance = self._cell_m, self._cell_m**2
+        cell, variance, noise = self._cell_m, self._cell_m**2, motion.covariance
         dx, dy = (c * motion.x - s * motion.y) / cell, (s * motion.x + c * motion.y) / cell
-        xx = (c * c * motion.xx - 2.0 * c * s * motion.xy + s * s * motion.yy) / variance
-        yy = (s * s * motion.xx + 2.0 * c * s * motion.xy + c * c * motion.yy) / variance
+        xx = (c * c * noise.xx - 2.0 * c * s * noise.xy + s * s * noise.yy) / variance
+        yy = (s * s * noise.xx + 2.0 * c * s * noise.xy + c * c * noise.yy) / variance
         along_x, along_y = (
             floor_kernel(dx, xx, histogram.shape[1]),
             floor_kernel(dy, yy, histogram.shape[2]),
         )
         floors = along_x @ histogram @ along_y.transpose(0, 2, 1)
-        turned = turn_kernel(motion.heading / self._bin_rad, motion.hh / self._bin_rad**2, len(heading))
+        turned = turn_kernel(motion.heading / self._bin_rad, noise.hh / self._bin_rad**2, len(heading))
         return np.maximum(np.tensordot(turned, floors, axes=1), 0.0)
 
 

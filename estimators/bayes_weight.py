@@ -23,15 +23,12 @@ from fusion import (
     Estimate,
     Fate,
     Increment,
-    Measurement,
-    Odometry,
     ParameterError,
     Pose,
     Prior,
-    Ranges,
+    Radio,
     Reason,
     Tag,
-    WifiScan,
     World,
     compose,
     sightings,
@@ -51,11 +48,10 @@ LARGEST_EXPONENT = 600.0
 
 
 class State(NamedTuple):
-    """Pose and covariance at the last fix, the motion since, and readings waiting for a fix."""
+    """Pose and covariance at the last epoch, and readings waiting for a fix."""
 
     pose: Pose
     covariance: Covariance
-    motion: Increment
     recent: Recent
     position_known: bool
 
@@ -88,28 +84,26 @@ class BayesWeight:
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
         """The prior, no motion yet."""
-        return State(*starting_belief(self._world, prior), Increment(), (), prior.position_known)
+        return State(*starting_belief(self._world, prior), (), prior.position_known)
 
-    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
-        """Gather motion; weigh a fix in when there is one."""
-        if isinstance(measurement, Odometry):
-            return state._replace(motion=state.motion.extend(measurement, self._world.robot.noise)), ()
-        if not isinstance(measurement, WifiScan | Ranges):
-            return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
-        seen = sightings(self._world, measurement)
-        recent = remember(state.recent, measurement.time_ns, seen, self._window_ns)
+    def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
+        """Move; weigh a fix in when there is one."""
+        pose, covariance = compose(state.pose, state.covariance, motion)
+        if scan is None:
+            return state._replace(pose=pose, covariance=covariance), ()
+        seen = sightings(self._world, scan)
+        recent = remember(state.recent, scan.time_ns, seen, self._window_ns)
         fix = fix_from(recent, self._world.robot)
         if isinstance(fix, Reason):
-            return state._replace(recent=recent), unusable(measurement, fix)
-        pose, covariance = compose(state.pose, state.covariance, state.motion)
+            return state._replace(pose=pose, covariance=covariance, recent=recent), unusable(scan, fix)
         moved, moved_covariance, good = self.weigh(pose, covariance, fix, position_known=state.position_known)
         verdict = (Decision.USED, Reason.OK) if good >= USED_FROM else (Decision.DOWNWEIGHTED, Reason.OUTLIER)
-        fates = fix_fates(measurement, seen, self._world.robot, (pose, covariance), verdict, good)
-        return State(moved, moved_covariance, Increment(), (), position_known=True), fates
+        fates = fix_fates(scan, seen, self._world.robot, (pose, covariance), verdict, good)
+        return State(moved, moved_covariance, (), position_known=True), fates
 
-    def estimate(self, state: State, time_ns: int) -> Estimate:
-        """The pose after the motion since the last fix; not valid from an unknown position before the first fix."""
-        pose, covariance = compose(state.pose, state.covariance, state.motion)
+    def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
+        """The pose after the motion since; not valid from an unknown position before the first fix."""
+        pose, covariance = compose(state.pose, state.covariance, motion)
         known = covariance.hh < HEADING_KNOWN_STD**2
         return Estimate(time_ns, pose, covariance, valid=state.position_known, heading_known=known)
 

@@ -13,11 +13,10 @@ from fusion import (
     Estimate,
     Fate,
     Increment,
-    Measurement,
-    Odometry,
     OdometryNoise,
     Pose,
     Prior,
+    Radio,
     Reason,
     Tag,
     World,
@@ -28,11 +27,11 @@ from fusion.screen import unusable
 
 
 class State(NamedTuple):
-    """Where the run started, and all motion since."""
+    """Where the run started, and the whole drive since as one increment."""
 
     pose: Pose
     covariance: Covariance
-    motion: Increment
+    drive: Increment
     position_known: bool
 
 
@@ -50,15 +49,15 @@ class DeadReckoning:
         """The prior, no motion yet."""
         return State(*starting_belief(self._world, prior), Increment(), prior.position_known)
 
-    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
-        """Add odometry."""
-        if isinstance(measurement, Odometry):
-            return state._replace(motion=state.motion.extend(measurement, self._noise)), ()
-        return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+    def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
+        """Drive on."""
+        fates = () if scan is None else unusable(scan, Reason.KIND_NOT_CONSUMED)
+        return state._replace(drive=state.drive.then(motion)), fates
 
-    def estimate(self, state: State, time_ns: int) -> Estimate:
-        """The start pose composed with all motion; not valid when the start position is unknown."""
-        pose, covariance = compose(state.pose, state.covariance, _with_calibration(state.motion, self._noise))
+    def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
+        """The start pose composed with the whole drive; not valid when the start position is unknown."""
+        drive = _with_calibration(state.drive.then(motion), self._noise)
+        pose, covariance = compose(state.pose, state.covariance, drive)
         known = covariance.hh < HEADING_KNOWN_STD**2
         return Estimate(time_ns, pose, covariance, valid=state.position_known, heading_known=known)
 
@@ -70,9 +69,9 @@ def _with_calibration(motion: Increment, noise: OdometryNoise) -> Increment:
         (noise.turn_scale_std, (motion.x_by_scale, motion.y_by_scale, motion.heading)),
         (noise.turn_bias_std_rad_s, (motion.x_by_bias, motion.y_by_bias, motion.duration_s)),
     )
-    xx, xy, xh, yy, yh, hh = motion.xx, motion.xy, motion.xh, motion.yy, motion.yh, motion.hh
+    xx, xy, xh, yy, yh, hh = motion.covariance
     for std, (x, y, h) in columns:
         v = std * std
         xx, xy, xh = xx + v * x * x, xy + v * x * y, xh + v * x * h
         yy, yh, hh = yy + v * y * y, yh + v * y * h, hh + v * h * h
-    return motion._replace(xx=xx, xy=xy, xh=xh, yy=yy, yh=yh, hh=hh)
+    return motion._replace(covariance=Covariance(xx, xy, xh, yy, yh, hh))

@@ -13,16 +13,14 @@ from fusion import (
     Decision,
     Estimate,
     Fate,
-    Measurement,
-    Odometry,
+    Increment,
     ParameterError,
     Pose,
     Prior,
-    Ranges,
+    Radio,
     Reason,
     Sighting,
     Tag,
-    WifiScan,
     World,
     sightings,
     wrap_angle,
@@ -130,31 +128,29 @@ class DynamicWeight:
         pose, _ = starting_belief(self._world, prior)
         return State(pose, pose, 0.5, 0, 0.0, (), prior.position_known, prior.heading_known)
 
-    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
+    def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
         """Odometry moves both positions; a fix is weighed in."""
-        if isinstance(measurement, Odometry):
-            return self._move(state, measurement), ()
-        if not isinstance(measurement, WifiScan | Ranges):
-            return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
-        seen = sightings(self._world, measurement)
-        recent = remember(state.recent, measurement.time_ns, seen, self._window_ns)
+        state = self._moved(state, motion)
+        if scan is None:
+            return state, ()
+        seen = sightings(self._world, scan)
+        recent = remember(state.recent, scan.time_ns, seen, self._window_ns)
         fix = fix_from(recent, self._world.robot)  # Algorithm 1, line 4
         if isinstance(fix, Reason):
             counter = state.odo_counter + int(self._count_missing)
-            return state._replace(recent=recent, odo_counter=counter), unusable(measurement, fix)
-        return self._fuse(state, self._base(fix, state), measurement, seen)
+            return state._replace(recent=recent, odo_counter=counter), unusable(scan, fix)
+        return self._fuse(state, self._base(fix, state), scan, seen)
 
-    def estimate(self, state: State, time_ns: int) -> Estimate:
+    def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
         """The fused position with odometry's heading; no covariance is claimed."""
-        return Estimate(time_ns, state.fused, None, valid=state.position_known, heading_known=state.heading_known)
+        fused = self._moved(state, motion).fused
+        return Estimate(time_ns, fused, None, valid=state.position_known, heading_known=state.heading_known)
 
-    def _move(self, state: State, odometry: Odometry) -> State:
+    def _moved(self, state: State, motion: Increment) -> State:
         """Algorithm 1, line 3: (x_odo, y_odo) from the wheels and the previous location."""
-        half = 0.5 * odometry.turn_rad
-        step = Pose(odometry.distance_m * math.cos(half), odometry.distance_m * math.sin(half), odometry.turn_rad)
-        travelled = state.travelled_m + abs(odometry.distance_m)
-        moved = state._replace(fused=state.fused.compose(step), travelled_m=travelled)
-        return moved._replace(odometry=moved.fused if self._feedback else state.odometry.compose(step))
+        travelled = state.travelled_m + motion.path_m
+        moved = state._replace(fused=state.fused.compose(motion.pose), travelled_m=travelled)
+        return moved._replace(odometry=moved.fused if self._feedback else state.odometry.compose(motion.pose))
 
     def _base(self, fix: Fix, state: State) -> tuple[float, float]:
         """The robot's base for a fix of its antenna, with odometry's heading."""
@@ -163,7 +159,7 @@ class DynamicWeight:
         return fix.x - arm_x, fix.y - arm_y
 
     def _fuse(
-        self, state: State, fix: tuple[float, float], scan: WifiScan | Ranges, seen: tuple[Sighting, ...]
+        self, state: State, fix: tuple[float, float], scan: Radio, seen: tuple[Sighting, ...]
     ) -> tuple[State, tuple[Fate, ...]]:
         """Algorithm 1, lines 5 and 6. From an unknown position, odometry starts at the first fix."""
         expected = (state.odometry, None) if state.position_known else None

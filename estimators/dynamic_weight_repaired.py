@@ -24,15 +24,12 @@ from fusion import (
     Estimate,
     Fate,
     Increment,
-    Measurement,
-    Odometry,
     ParameterError,
     Pose,
     Prior,
-    Ranges,
+    Radio,
     Reason,
     Tag,
-    WifiScan,
     World,
     compose,
     sightings,
@@ -45,11 +42,10 @@ from fusion.values import nanoseconds
 
 
 class State(NamedTuple):
-    """Pose and covariance at the last fix, the motion since, the counter, and readings waiting for a fix."""
+    """Pose and covariance at the last epoch, the counter, and readings waiting for a fix."""
 
     pose: Pose
     covariance: Covariance
-    motion: Increment
     odo_counter: int
     recent: Recent
     position_known: bool
@@ -102,31 +98,29 @@ class DynamicWeightRepaired:
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
         """Algorithm 1, lines 1 and 2."""
-        return State(*starting_belief(self._world, prior), Increment(), 0, (), prior.position_known)
+        return State(*starting_belief(self._world, prior), 0, (), prior.position_known)
 
-    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
-        """Gather motion; weigh a fix in when there is one."""
-        if isinstance(measurement, Odometry):
-            return state._replace(motion=state.motion.extend(measurement, self._world.robot.noise)), ()
-        if not isinstance(measurement, WifiScan | Ranges):
-            return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
-        seen = sightings(self._world, measurement)
-        recent = remember(state.recent, measurement.time_ns, seen, self._window_ns)
+    def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
+        """Move; weigh a fix in when there is one."""
+        pose, covariance = compose(state.pose, state.covariance, motion)
+        if scan is None:
+            return state._replace(pose=pose, covariance=covariance), ()
+        seen = sightings(self._world, scan)
+        recent = remember(state.recent, scan.time_ns, seen, self._window_ns)
         fix = fix_from(recent, self._world.robot)
         if isinstance(fix, Reason):
-            return state._replace(recent=recent), unusable(measurement, fix)
-        pose, covariance = compose(state.pose, state.covariance, state.motion)
+            return state._replace(pose=pose, covariance=covariance, recent=recent), unusable(scan, fix)
         wifi_weight, counter = self.weigh(state, pose, covariance, fix)
         outlier = wifi_weight == 0.0
         verdict = (Decision.REJECTED, Reason.OUTLIER) if outlier else (Decision.USED, Reason.OK)
         belief = (pose, covariance) if state.position_known else None
-        fates = fix_fates(measurement, seen, self._world.robot, belief, verdict, wifi_weight)
+        fates = fix_fates(scan, seen, self._world.robot, belief, verdict, wifi_weight)
         fused = average(pose, covariance, fix, wifi_weight, self._world)
-        return State(*fused, Increment(), counter, (), position_known=True), fates
+        return State(*fused, counter, (), position_known=True), fates
 
-    def estimate(self, state: State, time_ns: int) -> Estimate:
-        """The pose after the motion since the last fix; not valid from an unknown position before the first fix."""
-        pose, covariance = compose(state.pose, state.covariance, state.motion)
+    def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
+        """The pose after the motion since; not valid from an unknown position before the first fix."""
+        pose, covariance = compose(state.pose, state.covariance, motion)
         known = covariance.hh < HEADING_KNOWN_STD**2
         return Estimate(time_ns, pose, covariance, valid=state.position_known, heading_known=known)
 

@@ -23,36 +23,33 @@ from fusion import (
     Estimate,
     Fate,
     Increment,
-    Measurement,
-    Odometry,
+    Move,
     ParameterError,
     Pose,
     Prior,
-    Ranges,
+    Radio,
     Reason,
     Sighting,
     Tag,
-    WifiScan,
     World,
+    move,
     sightings,
     wrap_angle,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.radio import PathLoss, Ranging
-from fusion.screen import unusable
 
 Array = NDArray[np.float64]
-POSE = slice(0, 3)
+POSE, CALIBRATION = slice(0, 3), slice(3, 6)
 HEADING = 2
 
 
 class State(NamedTuple):
-    """Belief at the last radio epoch and the motion since; arrays are never written to."""
+    """The belief, and the path driven since the last scan; arrays are never written to."""
 
-    time_ns: int
     mean: Array
     covariance: Array
-    motion: Increment
+    path_m: float
 
 
 class Ekf:
@@ -134,77 +131,66 @@ class Ekf:
         mean[POSE] = pose
         covariance[POSE, POSE] = pose_covariance.matrix
         covariance[range(3, size), range(3, size)] = self._extra_variance
-        return State(prior.time_ns, mean, covariance, Increment())
+        return State(mean, covariance, 0.0)
 
-    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
-        """Gather motion; at a radio reading compose it and update."""
-        if isinstance(measurement, Odometry):
-            motion = state.motion.extend(measurement, self._world.robot.noise)
-            return state._replace(time_ns=measurement.time_ns, motion=motion), ()
-        if isinstance(measurement, WifiScan | Ranges):
-            return self._update(state, measurement)
-        return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+    def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
+        """Compose the motion; update by the readings."""
+        mean, covariance = self._moved(state, motion)
+        path_m = state.path_m + motion.path_m
+        if scan is None:
+            return _state(mean, covariance, path_m), ()
+        return self._updated(mean, covariance, path_m, scan)
 
-    def estimate(self, state: State, time_ns: int) -> Estimate:
-        """The pose after the motion since the last reading."""
-        mean, covariance = self._moved(state)
-        p = covariance.tolist()
-        spread = Covariance.from_matrix(p)
-        known = spread.hh < HEADING_KNOWN_STD**2
-        x, y, heading = mean[POSE].tolist()
-        return Estimate(time_ns, Pose(x, y, wrap_angle(heading)), spread, heading_known=known)
+    def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
+        """The pose after the motion since; nothing but pose and calibration moves it."""
+        mean, spread = state.mean[POSE].tolist(), state.covariance[POSE, POSE]
+        if motion.duration_s > 0.0:
+            step, rows = self._move(state.mean, motion)
+            size = rows.shape[1]
+            mean = [mean[0] + step.dx, mean[1] + step.dy, mean[2] + step.turn]
+            spread = rows @ state.covariance[:size, :size] @ rows.T + step.noise.matrix
+        covariance = Covariance.from_matrix(spread.tolist())
+        pose = Pose(mean[0], mean[1], wrap_angle(mean[2]))
+        return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
 
-    def _moved(self, state: State) -> tuple[Array, Array]:
-        """Mean and covariance with the pending motion composed: P <- F P Fᵀ + Q."""
-        motion = state.motion
+    def _move(self, mean: Array, motion: Increment) -> tuple[Move, Array]:
+        """The move of the pose, and its Jacobian by the leading block of the state (pose, calibration): (3, 3 or 6)."""
+        errors = mean[CALIBRATION].tolist() if self._calibrated else (0.0, 0.0, 0.0)
+        step = move(float(mean[HEADING]), motion, *errors)
+        rows = (
+            (1.0, 0.0, -step.dy, *step.x_by_errors),
+            (0.0, 1.0, step.dx, *step.y_by_errors),
+            (0.0, 0.0, 1.0, *step.turn_by_errors),
+        )
+        return step, np.array(rows)[:, : 6 if self._calibrated else 3]
+
+    def _moved(self, state: State, motion: Increment) -> tuple[Array, Array]:
+        """Mean and covariance after ``motion``: P <- F P Fᵀ + Q, where F is the identity but for the rows of the pose
+        and the fading of the anchors' errors.
+        """
         if motion.duration_s == 0.0:
             return state.mean, state.covariance
-        mean, transition = self._transition(state.mean, motion)
-        c, s = math.cos(state.mean[HEADING]), math.sin(state.mean[HEADING])
-        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        white = np.array(
-            [[motion.xx, motion.xy, motion.xh], [motion.xy, motion.yy, motion.yh], [motion.xh, motion.yh, motion.hh]]
-        )
-        covariance = transition @ state.covariance @ transition.T
-        covariance[POSE, POSE] += rotation @ white @ rotation.T
-        renewed = 1.0 - np.exp(-2.0 * motion.path_m / self._bias_length_m)
-        biases = range(self._first_bias, len(mean))
-        covariance[biases, biases] += renewed * self._extra_variance[self._first_bias - 3 :]
+        step, rows = self._move(state.mean, motion)
+        mean, covariance = state.mean.copy(), state.covariance.copy()
+        mean[POSE] += (step.dx, step.dy, step.turn)
+        top = rows @ covariance[: rows.shape[1]]
+        covariance[POSE], covariance[:, POSE] = top, top.T
+        covariance[POSE, POSE] = top[:, : rows.shape[1]] @ rows.T + step.noise.matrix
+        kept = np.exp(-motion.path_m / self._bias_length_m)
+        first, biases = self._first_bias, range(self._first_bias, len(mean))
+        mean[first:] *= kept
+        covariance[first:] *= kept[:, None]
+        covariance[:, first:] *= kept
+        covariance[biases, biases] += (1.0 - kept * kept) * self._extra_variance[first - 3 :]
         return mean, covariance
 
-    def _transition(self, mean: Array, motion: Increment) -> tuple[Array, Array]:
-        """The moved mean and the Jacobian F of the motion by the whole state."""
-        moved, transition = mean.copy(), np.eye(len(mean))
-        distance_error, turn_error, turn_bias = mean[3:6].tolist() if self._calibrated else (0.0, 0.0, 0.0)
-        stretch = 1.0 + distance_error
-        body_x = motion.x + motion.x_by_scale * turn_error + motion.x_by_bias * turn_bias
-        body_y = motion.y + motion.y_by_scale * turn_error + motion.y_by_bias * turn_bias
-        c, s = math.cos(mean[HEADING]), math.sin(mean[HEADING])
-        away_x, away_y = c * body_x - s * body_y, s * body_x + c * body_y
-        moved[0] += stretch * away_x
-        moved[1] += stretch * away_y
-        moved[HEADING] += motion.heading * (1.0 + turn_error) + motion.duration_s * turn_bias
-        transition[0, HEADING], transition[1, HEADING] = -stretch * away_y, stretch * away_x
-        if self._calibrated:
-            by_x, by_y = (
-                np.array([motion.x_by_scale, motion.x_by_bias]),
-                np.array([motion.y_by_scale, motion.y_by_bias]),
-            )
-            transition[0, 3:6] = away_x, *(stretch * (c * by_x - s * by_y))
-            transition[1, 3:6] = away_y, *(stretch * (s * by_x + c * by_y))
-            transition[2, 4:6] = motion.heading, motion.duration_s
-        kept = np.exp(-motion.path_m / self._bias_length_m)
-        biases = range(self._first_bias, len(mean))
-        moved[self._first_bias :] *= kept
-        transition[biases, biases] = kept
-        return moved, transition
-
-    def _update(self, state: State, scan: WifiScan | Ranges) -> tuple[State, tuple[Fate, ...]]:
-        prior_mean, prior_covariance = self._moved(state)
+    def _updated(
+        self, prior_mean: Array, prior_covariance: Array, path_m: float, scan: Radio
+    ) -> tuple[State, tuple[Fate, ...]]:
         mean, covariance = prior_mean.copy(), prior_covariance
         fates = []
         for sighting in sightings(self._world, scan):
-            innovation, row, variance = self._linearise(sighting, prior_mean, state.motion.path_m)
+            innovation, row, variance = self._linearise(sighting, prior_mean, path_m)
             spread = float(row @ prior_covariance @ row) + variance
             nis = innovation * innovation / spread
             used = nis <= self._gate
@@ -217,8 +203,7 @@ class Ekf:
             verdict = (Decision.USED, Reason.OK, 1.0) if used else (Decision.REJECTED, Reason.GATE, 0.0)
             who = (scan.time_ns, scan.sensor, scan.seq, sighting.anchor.id)
             fates.append(Fate(*who, *verdict, innovation, spread, nis))
-        mean[HEADING] = wrap_angle(float(mean[HEADING]))
-        return State(scan.time_ns, mean, 0.5 * (covariance + covariance.T), Increment()), tuple(fates)
+        return _state(mean, covariance, 0.0), tuple(fates)
 
     def _linearise(self, sighting: Sighting, mean: Array, path_m: float) -> tuple[float, Array, float]:
         """Innovation, Jacobian row and variance of one reading at the belief ``mean``, ``path_m`` after the last."""
@@ -235,6 +220,12 @@ class Ekf:
             return innovation, row, variance + times * sighting.model.bias_std**2
         row[bias] = 1.0
         return innovation - float(mean[bias]), row, variance
+
+
+def _state(mean: Array, covariance: Array, path_m: float) -> State:
+    """The state, its heading wrapped and its covariance symmetric to the last bit."""
+    mean[HEADING] = wrap_angle(float(mean[HEADING]))
+    return State(mean, 0.5 * (covariance + covariance.T), path_m)
 
 
 def chi_square_gate(probability: float) -> float:

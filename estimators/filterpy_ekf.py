@@ -8,7 +8,6 @@ predicted and compared with readings.
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from importlib.util import find_spec
 from types import ModuleType
@@ -24,22 +23,19 @@ from fusion import (
     Estimate,
     Fate,
     Increment,
-    Measurement,
-    Odometry,
     ParameterError,
     Pose,
     Prior,
-    Ranges,
+    Radio,
     Reason,
     Sighting,
     Tag,
-    WifiScan,
     World,
+    move,
     sightings,
     wrap_angle,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.screen import unusable
 
 if find_spec("filterpy") is None:
     # Its import takes a second, and waits until it is used; that it is missing is known at once.
@@ -49,12 +45,11 @@ Readings = tuple[Sighting, ...]
 
 
 class State(NamedTuple):
-    """Belief at the last radio epoch and the motion since."""
+    """The belief, and the path driven since the last scan."""
 
-    time_ns: int
     pose: Pose
     covariance: Covariance
-    motion: Increment
+    path_m: float
 
 
 class FilterpyFilter(ABC):
@@ -70,8 +65,8 @@ class FilterpyFilter(ABC):
         self._most_alike = require_most_alike("filterpy", most_alike)
 
     @abstractmethod
-    def _predicted(self, state: State) -> Any:  # noqa: ANN401 - filterpy is not typed
-        """The filter of filterpy with the belief of ``state``, moved by its pending motion."""
+    def _predicted(self, state: State, motion: Increment) -> Any:  # noqa: ANN401 - filterpy is not typed
+        """The filter of filterpy with the belief of ``state``, after ``motion``."""
 
     @abstractmethod
     def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
@@ -83,26 +78,26 @@ class FilterpyFilter(ABC):
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
         """The prior; what is unknown gets the moments of a uniform distribution."""
-        return State(prior.time_ns, *starting_belief(self._world, prior), Increment())
+        return State(*starting_belief(self._world, prior), 0.0)
 
-    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
-        """Gather motion; at a radio reading predict and update."""
-        if isinstance(measurement, Odometry):
-            motion = state.motion.extend(measurement, self._world.robot.noise)
-            return state._replace(time_ns=measurement.time_ns, motion=motion), ()
-        if isinstance(measurement, WifiScan | Ranges):
-            return self._update(state, measurement)
-        return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+    def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
+        """Predict; update by the readings."""
+        belief, path_m = self._predicted(state, motion), state.path_m + motion.path_m
+        if scan is None:
+            return State(*copied_out(belief), path_m), ()
+        fates = self._update(belief, scan, path_m)
+        return State(*copied_out(belief), 0.0), fates
 
-    def estimate(self, state: State, time_ns: int) -> Estimate:
-        """The pose after the motion since the last reading."""
+    def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
+        """The pose after the motion since."""
         pose, covariance = state.pose, state.covariance
-        if state.motion.duration_s > 0.0:
-            pose, covariance = copied_out(self._predicted(state))
+        if motion.duration_s > 0.0:
+            pose, covariance = copied_out(self._predicted(state, motion))
         return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
 
-    def _update(self, state: State, scan: WifiScan | Ranges) -> tuple[State, tuple[Fate, ...]]:
-        belief, readings = self._predicted(state), sightings(self._world, scan)
+    def _update(self, belief: Any, scan: Radio, path_m: float) -> tuple[Fate, ...]:  # noqa: ANN401
+        """Bring the readings of a scan, ``path_m`` after the last, into ``belief``."""
+        readings = sightings(self._world, scan)
         values, variances = self._expected(belief, readings)
         fates, used = [], []
         for sighting, value, variance in zip(readings, values.tolist(), variances.tolist(), strict=True):
@@ -115,10 +110,9 @@ class FilterpyFilter(ABC):
             who = (scan.time_ns, scan.sensor, scan.seq, sighting.anchor.id)
             fates.append(Fate(*who, *verdict, innovation, spread, nis))
         if used:
-            path_m = state.motion.path_m
             noise = np.diag([repeated_variance(sighting, path_m, self._most_alike) for sighting in used])
             self._correct(belief, tuple(used), noise)
-        return State(scan.time_ns, *copied_out(belief), Increment()), tuple(fates)
+        return tuple(fates)
 
 
 class FilterpyEkf(FilterpyFilter):
@@ -137,15 +131,14 @@ class FilterpyEkf(FilterpyFilter):
 
     summary: ClassVar[str] = "extended Kalman filter of filterpy"
 
-    def _predicted(self, state: State) -> Any:  # noqa: ANN401
+    def _predicted(self, state: State, motion: Increment) -> Any:  # noqa: ANN401
         """The motion's Jacobian A as filterpy's F, and what it leaves of the motion as filterpy's control input."""
         belief = filterpy_kalman().ExtendedKalmanFilter(dim_x=3, dim_z=1)
         belief.x, belief.P = np.array(state.pose), np.array(state.covariance.matrix)
-        moved = away(belief.x, state.motion)
-        dx, dy, _ = moved - belief.x
-        belief.F = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])
-        belief.B, belief.Q = np.eye(3), motion_noise(state)
-        belief.predict(u=moved - belief.F @ belief.x)
+        moved = move(state.pose.heading, motion)
+        belief.F = np.array([[1.0, 0.0, -moved.dy], [0.0, 1.0, moved.dx], [0.0, 0.0, 1.0]])
+        belief.B, belief.Q = np.eye(3), np.array(moved.noise.matrix)
+        belief.predict(u=belief.x + np.array(moved[:3]) - belief.F @ belief.x)
         return belief
 
     def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
@@ -171,21 +164,6 @@ def filterpy_kalman() -> ModuleType:
 
     module: ModuleType = filterpy.kalman
     return module
-
-
-def away(x: Array, motion: Increment) -> Array:
-    """The pose ``x`` (3,) after ``motion``; the heading is not wrapped, so that differences of poses stay plain."""
-    c, s = math.cos(x[2]), math.sin(x[2])
-    return np.asarray(x + np.array([c * motion.x - s * motion.y, s * motion.x + c * motion.y, motion.heading]))
-
-
-def motion_noise(state: State) -> Array:
-    """Q = B C Bᵀ, the noise of the pending motion turned into the map frame (see `fusion.compose`)."""
-    motion = state.motion
-    c, s = math.cos(state.pose.heading), math.sin(state.pose.heading)
-    turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    own = Covariance(motion.xx, motion.xy, motion.xh, motion.yy, motion.yh, motion.hh)
-    return np.asarray(turned @ np.array(own.matrix) @ turned.T)
 
 
 def copied_out(belief: Any) -> tuple[Pose, Covariance]:  # noqa: ANN401

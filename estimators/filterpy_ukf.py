@@ -12,8 +12,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from estimators.filterpy_ekf import FilterpyFilter, Readings, State, away, filterpy_kalman, motion_noise
+from estimators.filterpy_ekf import FilterpyFilter, Readings, State, filterpy_kalman
 from estimators.sampling import Array, square_root
+from fusion import Increment, move
 
 
 class FilterpyUkf(FilterpyFilter):
@@ -32,14 +33,14 @@ class FilterpyUkf(FilterpyFilter):
 
     summary: ClassVar[str] = "unscented Kalman filter of filterpy"
 
-    def _predicted(self, state: State) -> Any:  # noqa: ANN401 - filterpy is not typed
+    def _predicted(self, state: State, motion: Increment) -> Any:  # noqa: ANN401 - filterpy is not typed
         kalman = filterpy_kalman()
         points = kalman.MerweScaledSigmaPoints(3, alpha=0.5, beta=2.25, kappa=0.0, sqrt_method=square_root)
         belief = kalman.UnscentedKalmanFilter(
-            dim_x=3, dim_z=1, dt=0.0, hx=None, fx=lambda x, _: away(x, state.motion), points=points
+            dim_x=3, dim_z=1, dt=0.0, hx=None, fx=lambda x, _: moved(x, motion), points=points
         )
         belief.x, belief.P = np.array(state.pose), np.array(state.covariance.matrix)
-        belief.Q = motion_noise(state)
+        belief.Q = np.array(move(state.pose.heading, motion).noise.matrix)
         belief.predict()
         return belief
 
@@ -58,3 +59,8 @@ class FilterpyUkf(FilterpyFilter):
         x, y, heading = poses.T
         columns = [sighting.expected_values(x, y, heading, antenna_m) for sighting in readings]
         return np.array(columns).reshape(-1, len(poses)).T
+
+
+def moved(x: Array, motion: Increment) -> Array:
+    """The pose ``x`` (3,) after ``motion``; the heading is not wrapped, so that differences of poses stay plain."""
+    return np.asarray(x + np.array(move(float(x[2]), motion)[:3]))

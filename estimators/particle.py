@@ -16,7 +16,6 @@ import numpy as np
 
 from estimators.sampling import (
     Array,
-    carried,
     judged,
     mixture,
     moments,
@@ -29,23 +28,18 @@ from fusion import (
     Estimate,
     Fate,
     Increment,
-    Measurement,
-    Odometry,
     ParameterError,
     Particles,
     Pose,
     Prior,
-    Ranges,
-    Reason,
+    Radio,
     Tag,
-    WifiScan,
     World,
     compose,
     generator,
     sightings,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.screen import unusable
 
 KERNEL = 0.1
 """Width of the resampling kernel as a share of the cloud's own standard deviation (Liu & West: small, e.g. 0.1)."""
@@ -58,15 +52,14 @@ X, Y, HEADING, DISTANCE_ERROR, TURN_ERROR, TURN_BIAS = range(6)
 
 
 class State(NamedTuple):
-    """The cloud at the last radio epoch with its moments, and the motion since; arrays are never written to."""
+    """The cloud with its moments, and the path driven since the last scan; arrays are never written to."""
 
-    time_ns: int
     seed: int
     cloud: Array
     weights: Array
     pose: Pose
     covariance: Covariance
-    motion: Increment
+    path_m: float
 
 
 class Particle:
@@ -114,65 +107,59 @@ class Particle:
         if not prior.heading_known:
             cloud[HEADING] = random.uniform(-math.pi, math.pi, self._count)
         weights = np.full(self._count, 1.0 / self._count)
-        return State(prior.time_ns, seed, cloud, weights, *moments(weights, *cloud[:3]), Increment())
+        return State(seed, cloud, weights, *moments(weights, *cloud[:3]), 0.0)
 
-    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
-        """Gather motion; at a radio reading move the cloud and weigh it."""
-        if isinstance(measurement, Odometry):
-            motion = state.motion.extend(measurement, self._world.robot.noise)
-            return state._replace(time_ns=measurement.time_ns, motion=motion), ()
-        if isinstance(measurement, WifiScan | Ranges):
-            return self._update(state, measurement)
-        return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+    def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
+        """Move the cloud, and weigh it by the readings."""
+        who = (motion.time_ns,) if scan is None else (scan.time_ns, scan.sensor, scan.seq)
+        random = generator(state.seed, *who)
+        cloud, path_m = moved(state.cloud, motion, random), state.path_m + motion.path_m
+        if scan is None:
+            return State(state.seed, cloud, state.weights, *moments(state.weights, *cloud[:3]), path_m), ()
+        return self._weighed(state._replace(cloud=cloud, path_m=path_m), scan, random)
 
-    def estimate(self, state: State, time_ns: int) -> Estimate:
-        """Mean and covariance of the cloud, after the motion since the last reading."""
-        pose, covariance = compose(state.pose, state.covariance, state.motion)
+    def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
+        """Mean and covariance of the cloud, after the motion since."""
+        pose, covariance = compose(state.pose, state.covariance, motion)
         return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
 
     def particles(self, state: State) -> Particles:
-        """The cloud, carried by the motion since the last reading."""
-        return Particles(
-            np.column_stack(carried(state.cloud[X], state.cloud[Y], state.cloud[HEADING], state.motion)), state.weights
-        )
+        """The cloud."""
+        return Particles(state.cloud[:2].T, state.weights)
 
-    def _update(self, state: State, scan: WifiScan | Ranges) -> tuple[State, tuple[Fate, ...]]:
-        random = generator(state.seed, scan)
-        cloud = moved(state.cloud, state.motion, random)
-        pose, covariance = moments(state.weights, *cloud[:3])
-        antenna_m, fates, log_weights = self._world.robot.antenna_m, [], np.log(state.weights)
+    def _weighed(self, state: State, scan: Radio, random: np.random.Generator) -> tuple[State, tuple[Fate, ...]]:
+        """The state after the readings of a scan; its moments are still those of before the motion."""
+        cloud, weights = state.cloud, state.weights
+        pose, covariance = moments(weights, *cloud[:3])
+        antenna_m, fates, log_weights = self._world.robot.antenna_m, [], np.log(weights)
         for sighting in sightings(self._world, scan):
             expected = sighting.expected_values(cloud[X], cloud[Y], cloud[HEADING], antenna_m)
-            between = float(state.weights @ np.square(expected - state.weights @ expected))
-            spread = repeated_variance(sighting, state.motion.path_m, self._most_alike)
+            between = float(weights @ np.square(expected - weights @ expected))
+            spread = repeated_variance(sighting, state.path_m, self._most_alike)
             variance = spread + BANDWIDTH**2 * between
             likelihood, good = mixture(sighting.value - expected, variance, self._outlier_share)
             log_weights = log_weights + np.log(likelihood)
-            share = min(float(state.weights @ good), 1.0)
+            share = min(float(weights @ good), 1.0)
             fates.append(judged(scan, sighting, pose, covariance, antenna_m, share))
         weights = np.exp(log_weights - log_weights.max())
         weights = np.maximum(weights / weights.sum(), np.finfo(float).tiny)
         if 1.0 / float(weights @ weights) < 0.5 * self._count:
             cloud, weights = resampled(cloud, weights, random)
-        moment = moments(weights, *cloud[:3])
-        return State(scan.time_ns, state.seed, cloud, weights, *moment, Increment()), tuple(fates)
+        return State(state.seed, cloud, weights, *moments(weights, *cloud[:3]), 0.0), tuple(fates)
 
 
 def moved(cloud: Array, motion: Increment, random: np.random.Generator) -> Array:
     """The cloud (6, n) after ``motion``, each particle with its own calibration error and its own noise."""
     if motion.duration_s == 0.0:
         return cloud
-    shape = Covariance(motion.xx, motion.xy, motion.xh, motion.yy, motion.yh, motion.hh)
-    noise = square_root(np.array(shape.matrix)) @ random.standard_normal((3, cloud.shape[1]))
-    error, bias = cloud[TURN_ERROR], cloud[TURN_BIAS]
-    stretch = 1.0 + cloud[DISTANCE_ERROR]
-    forward = stretch * (motion.x + motion.x_by_scale * error + motion.x_by_bias * bias) + noise[0]
-    left = stretch * (motion.y + motion.y_by_scale * error + motion.y_by_bias * bias) + noise[1]
+    noise = square_root(np.array(motion.covariance.matrix)) @ random.standard_normal((3, cloud.shape[1]))
+    forward, left, turn = motion.corrected(*cloud[3:])
+    forward, left = forward + noise[0], left + noise[1]
     c, s = np.cos(cloud[HEADING]), np.sin(cloud[HEADING])
     after = cloud.copy()
     after[X] += c * forward - s * left
     after[Y] += s * forward + c * left
-    after[HEADING] += motion.heading * (1.0 + error) + motion.duration_s * bias + noise[2]
+    after[HEADING] += turn + noise[2]
     return after
 
 

@@ -9,15 +9,13 @@ from fusion import (
     Decision,
     Estimate,
     Fate,
-    Measurement,
-    Odometry,
+    Increment,
     ParameterError,
     Pose,
     Prior,
-    Ranges,
+    Radio,
     Reason,
     Tag,
-    WifiScan,
     World,
     sightings,
 )
@@ -66,22 +64,19 @@ class RadioOnly:
         """Nothing heard yet."""
         return State((), None, prior.time_ns)
 
-    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
+    def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:  # noqa: ARG002
         """Make a fix from what was heard lately, if three anchors were."""
-        if isinstance(measurement, Odometry):
+        if scan is None:
             return state, ()
-        if not isinstance(measurement, WifiScan | Ranges):
-            return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
-        time_ns = measurement.time_ns
-        recent = remember(state.recent, time_ns, sightings(self._world, measurement), self._window_ns)
+        recent = remember(state.recent, scan.time_ns, sightings(self._world, scan), self._window_ns)
         fix = fix_from(recent, self._world.robot)
         if isinstance(fix, Reason):
-            return state._replace(recent=recent), unusable(measurement, fix)
-        who = (time_ns, measurement.sensor, measurement.seq)
-        fates = tuple(Fate(*who, r.anchor, Decision.USED, Reason.OK, 1.0) for r in measurement.readings)
-        return State(recent, self._clamped(fix), time_ns), fates
+            return state._replace(recent=recent), unusable(scan, fix)
+        who = (scan.time_ns, scan.sensor, scan.seq)
+        fates = tuple(Fate(*who, r.anchor, Decision.USED, Reason.OK, 1.0) for r in scan.readings)
+        return State(recent, self._clamped(fix), scan.time_ns), fates
 
-    def estimate(self, state: State, time_ns: int) -> Estimate:
+    def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:  # noqa: ARG002 - without motion
         """The last fix; not valid before the first, nor a second after the last."""
         if state.fix is None:
             return Estimate(time_ns, Pose(0.0, 0.0, 0.0), None, valid=False, heading_known=False)

@@ -19,10 +19,9 @@ from fusion import (
     Increment,
     ParameterError,
     Pose,
-    Ranges,
+    Radio,
     Reason,
     Sighting,
-    WifiScan,
     wrap_angle,
 )
 from fusion.radio import DistanceModel, PathLoss
@@ -122,7 +121,7 @@ def carried(x: Array, y: Array, heading: Array, motion: Increment) -> tuple[Arra
 
 
 def judged(
-    scan: WifiScan | Ranges,
+    scan: Radio,
     sighting: Sighting,
     pose: Pose,
     covariance: Covariance,

@@ -19,6 +19,7 @@ from fusion.driver import (
     Said,
     VirtualClock,
 )
+from fusion.epochs import Epoch
 from fusion.errors import (
     BeliefError,
     BusyError,
@@ -43,12 +44,14 @@ from fusion.errors import (
     WorldError,
 )
 from fusion.estimator import Estimator, ParticleEstimator, Particles, Tag, generator
+from fusion.fold import Fold, Update
 from fusion.geometry import Covariance, Pose, wrap_angle
-from fusion.motion import Increment, compose
+from fusion.motion import Increment, Move, compose, move
 from fusion.plugins import available, build, built_in_names, load, names, registered
 from fusion.screen import unusable
 from fusion.sighting import Sighting, sightings
-from fusion.track import Tracker, Update, final, track
+from fusion.timeline import Moment, Timeline
+from fusion.track import Tracker, final, track
 from fusion.values import (
     Decision,
     Estimate,
@@ -58,6 +61,7 @@ from fusion.values import (
     MotorCommand,
     Odometry,
     Prior,
+    Radio,
     RangeReading,
     Ranges,
     Reason,
@@ -87,10 +91,12 @@ __all__ = [
     "Driver",
     "DriverError",
     "DriverSpec",
+    "Epoch",
     "Estimate",
     "Estimator",
     "FakeDevice",
     "Fate",
+    "Fold",
     "Found",
     "FusionError",
     "Gyro",
@@ -99,7 +105,9 @@ __all__ = [
     "LogError",
     "Measurement",
     "MeasurementError",
+    "Moment",
     "MotorCommand",
+    "Move",
     "Needs",
     "NotFoundError",
     "NotInstalledError",
@@ -113,6 +121,7 @@ __all__ = [
     "Pose",
     "Prior",
     "ProtocolError",
+    "Radio",
     "RangeReading",
     "Ranges",
     "Reason",
@@ -125,6 +134,7 @@ __all__ = [
     "Sighting",
     "SuiteError",
     "Tag",
+    "Timeline",
     "Tracker",
     "Truth",
     "UnsupportedError",
@@ -143,6 +153,7 @@ __all__ = [
     "final",
     "generator",
     "load",
+    "move",
     "names",
     "registered",
     "sightings",

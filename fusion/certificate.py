@@ -1,11 +1,17 @@
-"""The replay certificate: one hash over every estimate and fate of a run, so that two replays can be compared."""
+"""The replay certificate: one hash over a run of an estimator, so that two replays can be compared.
+
+It covers the motion of every epoch, what became of every reading, and the estimate at every epoch. What happens between
+two epochs follows from these, so an estimate there need not be computed to be certified.
+"""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
 
-from fusion.track import Update
+from fusion.fold import Update
+from fusion.motion import Increment
+from fusion.values import Estimate, Fate
 
 
 def _numbers(*values: float | None) -> bytes:
@@ -23,15 +29,27 @@ class Certificate:
 
     def add(self, update: Update) -> None:
         """Take in one more update. Reads every number of it, so one that is no number raises here."""
-        estimate = update.estimate
+        for epoch in update.epochs:
+            self._add_motion(epoch.motion)
+        for fate in update.fates:
+            self._add_fate(fate)
+        if update.epochs:
+            self._add_estimate(update.estimate)
+
+    def _add_motion(self, motion: Increment) -> None:
+        x, y, heading, covariance, *rest = motion
+        self._total.update(struct.pack("<16dq", x, y, heading, *covariance, *rest))
+
+    def _add_fate(self, fate: Fate) -> None:
+        text = f"{fate.time_ns} {fate.sensor} {fate.seq} {fate.anchor} {fate.decision.value} {fate.reason.value}"
+        self._total.update(text.encode())
+        self._total.update(_numbers(fate.weight, fate.innovation, fate.innovation_variance, fate.nis))
+
+    def _add_estimate(self, estimate: Estimate) -> None:
         self._total.update(
             struct.pack("<q??q", estimate.time_ns, estimate.valid, estimate.heading_known, estimate.reset_count)
         )
         self._total.update(_numbers(*estimate.pose, *(estimate.covariance or (None,)), estimate.p_lost))
-        for fate in update.fates:
-            text = f"{fate.time_ns} {fate.sensor} {fate.seq} {fate.anchor} {fate.decision.value} {fate.reason.value}"
-            self._total.update(text.encode())
-            self._total.update(_numbers(fate.weight, fate.innovation, fate.innovation_variance, fate.nis))
 
     @property
     def digest(self) -> str:
@@ -40,7 +58,7 @@ class Certificate:
 
 
 def digest(updates: Iterable[Update]) -> str:
-    """SHA-256 of every estimate and fate of ``updates``, in order, as hexadecimal text."""
+    """SHA-256 of the motion, fates and estimates of ``updates``, in order, as hexadecimal text."""
     certificate = Certificate()
     for update in updates:
         certificate.add(update)

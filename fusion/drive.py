@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fusion.geometry import Covariance, Pose, wrap_angle
-from fusion.track import order
+from fusion.timeline import order
 from fusion.values import (
     NANOSECONDS,
     Gyro,

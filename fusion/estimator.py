@@ -14,7 +14,8 @@ from typing import ClassVar, NamedTuple, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from fusion.values import Estimate, Fate, Measurement, Prior
+from fusion.motion import Increment
+from fusion.values import Estimate, Fate, Prior, Radio
 
 State = TypeVar("State")
 State_contra = TypeVar("State_contra", contravariant=True)
@@ -42,8 +43,10 @@ class Tag(Enum):
 
 @runtime_checkable
 class Estimator(Protocol[State]):
-    """What the host calls. The measurements handed to ``step`` are in order, finite, of known anchors; motion comes
-    as `Odometry` that reaches up to each radio measurement.
+    """What the host calls, epoch by epoch: a stretch of motion, and the radio scan at its end.
+
+    The host has screened the readings, put them in order and integrated the motion, the same for every estimator; a
+    state is the belief at its own moment, the last epoch's, and ``motion`` is always what followed it.
     """
 
     summary: ClassVar[str]
@@ -51,13 +54,17 @@ class Estimator(Protocol[State]):
     tags: ClassVar[frozenset[Tag]]
 
     def start(self, prior: Prior, seed: int) -> State:
-        """The state before the first measurement."""
+        """The state before the first measurement, at the time of ``prior``."""
 
-    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
-        """The state after ``measurement``, and what became of its readings. Never raises on a finite reading."""
+    def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
+        """The state after ``motion`` and then ``scan``, and what became of its readings, one Fate each.
 
-    def estimate(self, state: State, time_ns: int) -> Estimate:
-        """The belief at ``time_ns``, not before the state's own time. Later is never more certain."""
+        ``scan`` None: a long stretch of motion without radio is closed, for no calibration derivative of an
+        `Increment` holds for ever. Never raises on finite readings.
+        """
+
+    def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
+        """The belief at ``time_ns``, after the ``motion`` since the state's own moment. Later is never more certain."""
 
 
 class Particles(NamedTuple):
@@ -79,14 +86,15 @@ class ParticleEstimator(Protocol[State_contra]):
     """
 
     def particles(self, state: State_contra) -> Particles:
-        """The points of ``state``, where they are at its own time."""
+        """The points of ``state``, at its own moment."""
 
 
-def generator(seed: int, measurement: Measurement, purpose: int = 0) -> np.random.Generator:
-    """Random numbers for one measurement: the same whatever else was or was not processed.
+def generator(seed: int, time_ns: int, sensor: str = "", seq: int = 0, purpose: int = 0) -> np.random.Generator:
+    """Random numbers for one epoch, named by its time and the sensor and sequence number of its scan: the same
+    whatever else was or was not processed.
 
-    ``purpose`` keeps two draws at one measurement apart.
+    ``purpose`` keeps two draws at one epoch apart.
     """
-    name = int.from_bytes(measurement.sensor.encode()[:16], "little")
-    key = (abs(measurement.time_ns), name, abs(measurement.seq), purpose)
+    name = int.from_bytes(sensor.encode()[:16], "little")
+    key = (abs(time_ns), name, abs(seq), purpose)
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fusion.geometry import Covariance, Pose
 from fusion.sighting import Sighting
 from fusion.trilateration import Fix, are_collinear, trilaterate
-from fusion.values import Decision, Fate, Ranges, Reason, WifiScan
+from fusion.values import Decision, Fate, Radio, Reason
 from fusion.world import Robot
 
 MINIMUM_ANCHORS = 3
@@ -70,7 +70,7 @@ def fix_innovation(pose: Pose, fix: Fix, robot: Robot) -> tuple[Array, Array]:
 
 
 def fix_fates(
-    scan: WifiScan | Ranges,
+    scan: Radio,
     seen: tuple[Sighting, ...],
     robot: Robot,
     belief: tuple[Pose, Covariance | None] | None,

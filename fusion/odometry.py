@@ -1,9 +1,8 @@
 """From wheel ticks, motor commands and gyro to odometry increments, once for every estimator.
 
-The host folds every measurement through `Odometer.advance`. Estimators therefore meet one kind of motion,
-`Odometry`, and it always reaches up to the radio reading that follows it: where a reading falls between two odometry
-messages, the last twist is held up to it, and the part held is taken off when the real increment arrives, so motion
-counts exactly once.
+The front end of the host folds every measurement of motion through `Odometer.advance`, and holds the last twist up to
+a radio reading that falls between two odometry messages (`Odometer.hold`). The part held is taken off when the real
+increment arrives, so motion counts exactly once.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 
 from fusion.errors import MeasurementError
 from fusion.geometry import wrap_angle
-from fusion.values import Gyro, Measurement, MotorCommand, Odometry, WheelTicks, nanoseconds, seconds
+from fusion.values import Gyro, Motion, MotorCommand, Odometry, WheelTicks, nanoseconds, seconds
 from fusion.world import DRIVES, Robot
 
 MAX_HOLD_NS = nanoseconds(0.5)
@@ -114,18 +113,23 @@ class OdometerState(NamedTuple):
     gyro_angle_at_last: float = 0.0
 
 
-def _twisted(state: OdometerState, own: Odometry, turn_rad: float) -> OdometerState:
-    """The state with the twist of an increment: its mean, or over `TWIST_NS` where it is too short to say."""
+class _Twist(NamedTuple):
+    """Mean speed [m/s] and turn rate [rad/s] of an increment, and the time it is a mean over."""
+
+    span_ns: int
+    speed_m_s: float
+    turn_rate_rad_s: float
+
+
+def _twist(state: OdometerState, own: Odometry, turn_rad: float) -> _Twist:
+    """The twist of an increment: its mean, or over `TWIST_NS` where it is too short to give one."""
     span_ns = own.time_ns - own.from_ns
     if span_ns >= SHORT_NS or state.span_ns == 0:
         span_s = max(seconds(span_ns), 1e-9)
-        return state._replace(span_ns=span_ns, speed_m_s=own.distance_m / span_s, turn_rate_rad_s=turn_rad / span_s)
+        return _Twist(span_ns, own.distance_m / span_s, turn_rad / span_s)
     before, span_s = 1.0 - span_ns / TWIST_NS, seconds(TWIST_NS)
-    return state._replace(
-        span_ns=TWIST_NS,
-        speed_m_s=before * state.speed_m_s + own.distance_m / span_s,
-        turn_rate_rad_s=before * state.turn_rate_rad_s + turn_rad / span_s,
-    )
+    speed_m_s = before * state.speed_m_s + own.distance_m / span_s
+    return _Twist(TWIST_NS, speed_m_s, before * state.turn_rate_rad_s + turn_rad / span_s)
 
 
 def _forward(before: tuple[int, ...] | None, speeds_m_s: Sequence[float]) -> tuple[int, ...]:
@@ -147,22 +151,19 @@ class Odometer:
         """Motion is accounted for from ``time_ns`` on; no increment that ends by then may be handed to `advance`."""
         return OdometerState(start_ns=time_ns, covered_ns=time_ns, last_ns=time_ns)
 
-    def advance(self, state: OdometerState, measurement: Measurement) -> tuple[OdometerState, tuple[Measurement, ...]]:
-        """The measurements an estimator should see in place of ``measurement``, in order.
+    def advance(self, state: OdometerState, measurement: Motion) -> tuple[OdometerState, tuple[Odometry, ...]]:
+        """The state after a measurement of motion, and the increments that it brought, in order.
 
-        Raises `MeasurementError` when it tells of more or fewer wheels than the robot has.
+        Raises `MeasurementError` when it is of more or fewer wheels than the robot has.
         """
         if isinstance(measurement, Odometry):
             return self._real(state, measurement)
         if isinstance(measurement, WheelTicks):
             return self._ticks(state, measurement)
-        if isinstance(measurement, MotorCommand):
-            self._require_wheels(len(measurement.wheel_speeds_m_s), measurement)
-            return state._replace(forward=_forward(state.forward, measurement.wheel_speeds_m_s)), ()
         if isinstance(measurement, Gyro):
-            return self._gyro(state, measurement)
-        state, motion = self.hold(state, measurement.time_ns)
-        return state, (*motion, measurement)
+            return self._gyro(state, measurement), ()
+        self._require_wheels(len(measurement.wheel_speeds_m_s), measurement)
+        return state._replace(forward=_forward(state.forward, measurement.wheel_speeds_m_s)), ()
 
     def _require_wheels(self, count: int, measurement: WheelTicks | MotorCommand) -> None:
         wheels = DRIVES[self.robot.drive]
@@ -208,11 +209,13 @@ class Odometer:
             turn - state.held_turn_rad,
             odometry.measured,
         )
-        state = _twisted(state, own, turn)
+        twist = _twist(state, own, turn)
         return state._replace(
             covered_ns=max(state.covered_ns, odometry.time_ns),
             last_ns=odometry.time_ns,
-            span_ns=max(state.span_ns, odometry.time_ns - odometry.from_ns),
+            span_ns=max(twist.span_ns, odometry.time_ns - odometry.from_ns),
+            speed_m_s=twist.speed_m_s,
+            turn_rate_rad_s=twist.turn_rate_rad_s,
             held_distance_m=0.0,
             held_turn_rad=0.0,
             gyro_angle_at_last=angle,
@@ -237,13 +240,13 @@ class Odometer:
             counted, Odometry(ticks.time_ns, ticks.sensor, ticks.seq, state.last_ns, distance, wrap_angle(turn))
         )
 
-    def _gyro(self, state: OdometerState, gyro: Gyro) -> tuple[OdometerState, tuple[Measurement, ...]]:
+    def _gyro(self, state: OdometerState, gyro: Gyro) -> OdometerState:
         if self.robot.turn_source != "gyro":
-            return state, (gyro,)
+            return state
         rate, before = self.robot.gyro_scale * (gyro.rate_rad_s - self.robot.gyro_bias_rad_s), state.gyro
         if before is None:
             first = _GyroAngle(gyro.time_ns, 0.0, rate)
-            return state._replace(gyro=first, gyro_angle_at_last=first.at(state.last_ns)), ()
+            return state._replace(gyro=first, gyro_angle_at_last=first.at(state.last_ns))
         mean_rate = 0.5 * (before.rate + rate)
         angle = before.angle + mean_rate * seconds(gyro.time_ns - before.time_ns)
-        return state._replace(gyro=_GyroAngle(gyro.time_ns, angle, rate)), ()
+        return state._replace(gyro=_GyroAngle(gyro.time_ns, angle, rate))

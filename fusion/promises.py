@@ -17,11 +17,26 @@ import numpy as np
 
 from fusion.certificate import digest
 from fusion.drive import Drive, with_outlier, without
+from fusion.epochs import LONGEST, Epoch, Longest
 from fusion.errors import ConformanceError
 from fusion.estimator import Estimator, ParticleEstimator, Particles, Tag
+from fusion.fold import Update
 from fusion.geometry import Pose, wrap_angle
-from fusion.track import Tracker, Update, final, track
-from fusion.values import NANOSECONDS, Estimate, Measurement, Prior, Ranges, WifiScan, nanoseconds, seconds
+from fusion.motion import Increment
+from fusion.timeline import Timeline
+from fusion.track import Tracker, final, track
+from fusion.values import (
+    NANOSECONDS,
+    Estimate,
+    Gyro,
+    Measurement,
+    Odometry,
+    Prior,
+    Ranges,
+    WifiScan,
+    nanoseconds,
+    seconds,
+)
 
 Kind: TypeAlias = type[Any]
 """An estimator class; it is built with the world alone."""
@@ -39,6 +54,10 @@ may have moved each by itself, and the estimate as one.
 """
 SETTLED_NS = nanoseconds(5.0)
 """Time in which an estimator settles."""
+NEAR_CLOSED = 0.01
+"""How far a pose may move [m, rad] where stretches of motion are closed early: what first order leaves out."""
+SHORT = Longest(duration_s=0.25)
+"""Several stretches to a scan."""
 NOISY = Drive(noisy=True, duration_s=12.0)
 NOISELESS = Drive()
 
@@ -100,13 +119,29 @@ def _updates(
     return list(track(made(world), world, given, prior or drive.prior(), seed=seed))
 
 
-def _states(made: Kind, drive: Drive) -> Iterator[tuple[Estimator[Any], Any, Measurement]]:
-    """The bare fold, every state with the measurement that comes next. The drive's odometry reaches every reading."""
+def _epochs(drive: Drive, longest: Longest = LONGEST) -> Iterator[Epoch]:
+    """The epochs of a drive, whose measurements are in order."""
+    timeline = Timeline(drive.world(), drive.prior().time_ns, longest=longest)
+    for measurement in drive.measurements():
+        for moment in timeline.push(measurement):
+            yield from moment.epochs
+
+
+def _states(made: Kind, drive: Drive, longest: Longest = LONGEST) -> Iterator[tuple[Estimator[Any], Any, Epoch]]:
+    """The bare fold, every state with the epoch that comes next."""
     estimator = made(drive.world())
     state = estimator.start(drive.prior(), SEED)
-    for measurement in drive.measurements():
-        yield estimator, state, measurement
-        state, _ = estimator.step(state, measurement)
+    for epoch in _epochs(drive, longest):
+        yield estimator, state, epoch
+        state, _ = estimator.step(state, epoch.motion, epoch.scan)
+
+
+def _stepped(estimator: Estimator[Any], state: Any, epoch: Epoch) -> Update:  # noqa: ANN401 - a state is opaque
+    """One step of the bare fold, and the belief right after it."""
+    after, fates = estimator.step(state, epoch.motion, epoch.scan)
+    still = Increment(time_ns=epoch.time_ns)
+    gyro = Gyro(epoch.time_ns, "", 0, 0.0)
+    return Update(epoch.scan or gyro, estimator.estimate(after, still, epoch.time_ns), fates, epochs=(epoch,))
 
 
 def _same(one: Sequence[Update], other: Sequence[Update], meaning: str) -> None:
@@ -146,22 +181,19 @@ def _no_hidden_dice(made: Kind) -> None:
 
 @_promise("step-is-pure", "One state stepped twice gives one answer: the host goes back to old states.")
 def _step_is_pure(made: Kind) -> None:
-    for estimator, state, measurement in _states(made, NOISY):
-        answers = []
-        for _ in range(2):
-            after, fates = estimator.step(state, measurement)
-            answers.append(Update(measurement, estimator.estimate(after, measurement.time_ns), fates))
-        _same(answers[:1], answers[1:], "the same state stepped twice gives two answers")
+    for estimator, state, epoch in _states(made, NOISY):
+        once, again = (_stepped(estimator, state, epoch) for _ in range(2))
+        _same([once], [again], "the same state stepped twice gives two answers")
 
 
 @_promise("state-is-kept", "A step leaves the state it was given as it was: old states are the host's memory.")
 def _state_is_kept(made: Kind) -> None:
-    for estimator, state, measurement in _states(made, NOISY):
+    for estimator, state, epoch in _states(made, NOISY):
         before = pickle.dumps(state)
-        estimator.step(state, measurement)
+        _stepped(estimator, state, epoch)
         _require(
             pickle.dumps(state) == before,
-            f"step wrote into the state it was given, at {type(measurement).__name__} {measurement.seq}",
+            f"step or estimate wrote into the state it was given, at {seconds(epoch.time_ns)} s",
         )
 
 
@@ -178,25 +210,27 @@ def _estimate_is_pure(made: Kind) -> None:
 
 @_promise("state-pickles", "A state survives being stored: warm starts and other processes need it.")
 def _state_pickles(made: Kind) -> None:
-    for estimator, state, measurement in _states(made, NOISY):
-        answers = []
-        for given in (state, pickle.loads(pickle.dumps(state))):  # noqa: S301 - our own bytes, a moment old
-            after, fates = estimator.step(given, measurement)
-            answers.append(Update(measurement, estimator.estimate(after, measurement.time_ns), fates))
-        _same(answers[:1], answers[1:], "a state that was pickled and brought back goes on differently")
+    for estimator, state, epoch in _states(made, NOISY):
+        stored = pickle.loads(pickle.dumps(state))  # noqa: S301 - our own bytes, a moment old
+        once, again = (_stepped(estimator, given, epoch) for given in (state, stored))
+        _same([once], [again], "a state that was pickled and brought back goes on differently")
 
 
 @_promise("later-not-surer", "A later estimate is never more certain.", unless=[Tag.NO_COVARIANCE])
 def _later_not_surer(made: Kind) -> None:
-    for estimator, state, measurement in _states(made, NOISY):
-        now, later = (estimator.estimate(state, measurement.time_ns + wait) for wait in (0, 5 * NANOSECONDS))
+    noise = NOISY.world().robot.noise
+    for estimator, state, epoch in _states(made, NOISY):
+        later_ns = epoch.time_ns + 5 * NANOSECONDS
+        blind = Odometry(later_ns, "", 0, epoch.time_ns, 0.0, 0.0, measured=False)
+        now = estimator.estimate(state, epoch.motion, epoch.time_ns)
+        later = estimator.estimate(state, epoch.motion.extend(blind, noise), later_ns)
         if now.covariance is None or later.covariance is None or not later.valid:
             continue
         for name, before, after in zip(now.covariance._fields, now.covariance, later.covariance, strict=True):
             _require(
                 name not in ("xx", "yy", "hh") or after >= before * (1.0 - 1e-9),
                 f"variance {name} falls from {before:.6g} to {after:.6g} by looking 5 s ahead "
-                f"from {seconds(measurement.time_ns)} s",
+                f"from {seconds(epoch.time_ns)} s",
             )
 
 
@@ -385,6 +419,26 @@ def _rate_means_nothing(made: Kind) -> None:
             )
 
 
+@_promise("closing-changes-little", "A stretch of motion may be closed early: what follows is the same.")
+def _closing_changes_little(made: Kind) -> None:
+    ends = []
+    for longest in (LONGEST, SHORT):
+        *_, (estimator, state, epoch) = _states(made, NOISY, longest)
+        ends.append(estimator.estimate(state, epoch.motion, epoch.time_ns))
+        if epoch.scan is None:
+            _, fates = estimator.step(state, epoch.motion, None)
+            _require(not fates, f"a stretch without radio was closed, and its step reports {len(fates)} fates")
+    off = _apart(ends[0].pose, ends[1].pose)
+    chance = Tag.STOCHASTIC in made.tags
+    _require(off < (NEAR_RAD if chance else NEAR_CLOSED), f"stretches closed early move the pose by {off:.3g}")
+    for name in ("xx", "yy", "hh"):
+        one, other = (getattr(end.covariance, name, 1.0) for end in ends)
+        _require(
+            math.isclose(one, other, rel_tol=0.25 if chance else 0.05),
+            f"variance {name} is {one:.6g}, and {other:.6g} where stretches are closed early",
+        )
+
+
 @_promise("unknown-heading", "An unknown heading is not called known before it is.", unless=[Tag.NO_HEADING])
 def _unknown_heading(made: Kind) -> None:
     # The pose of such a prior says nothing; a wrong heading shows who believes it.
@@ -422,7 +476,7 @@ def _particles(made: Kind) -> None:
     for measurement in NOISY.measurements():
         asked += tracker.push(measurement)
         shown = tracker.particles()
-        if shown is not None:
+        if shown is not None and asked[-1].epochs:
             _be_the_belief(shown, asked[-1])
     _same(_updates(made, NOISY), asked, "showing the particles changed the answer")
 

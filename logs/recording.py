@@ -23,7 +23,7 @@ from fusion import (
 )
 from fusion.belief import UNKNOWN_HEADING_STD
 from fusion.errors import did_you_mean
-from fusion.track import order
+from fusion.timeline import order
 from fusion.values import NANOSECONDS
 from logs.run import left_out
 from logs.writer import RunWriter

@@ -15,7 +15,7 @@ from typing import TypeAlias, TypeVar
 
 from fusion import Gyro, LogError, Measurement, Odometry, Pose, RangeReading, Ranges, Truth, WifiScan, World
 from fusion.errors import ParameterError
-from fusion.track import order
+from fusion.timeline import order
 from logs.bag import TRANSFORM_TYPES, Bag, Keep, Topic, open_bag
 from logs.increments import pose_increments, wheel_increments
 from logs.recording import Recording, prior_from_truth

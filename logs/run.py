@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fusion import Estimate, Measurement, Prior, Remark, Truth, World
-from fusion.track import Key
+from fusion.timeline import Key
 from logs.device_messages import ClockSync
 
 
@@ -55,7 +55,7 @@ def left_out(placed: Sequence[bool]) -> list[str]:
     return [f"{missing} of {len(placed)} true poses have no position, and are left out"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Run:
     """One recorded run. ``measurements`` stand in the order they arrived; ``lanes`` holds the estimates of estimators
     that were replayed into the log, by name; ``remarks`` are what the devices said that is no measurement, ``clocks``

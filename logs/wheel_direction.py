@@ -11,7 +11,7 @@ import math
 from collections.abc import Collection, Iterable
 
 from fusion import Advice, Measurement, MotorCommand, Remark, Said, Truth, WheelTicks
-from fusion.track import order
+from fusion.timeline import order
 from fusion.values import seconds
 from fusion.world import DRIVES, Robot
 from logs.devices import is_down

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.metrics.track import Floats, Whole
 from fusion import LogError, MotorCommand, Odometry, WheelTicks
 from fusion.odometry import Odometer
-from fusion.track import order
+from fusion.timeline import order
 from fusion.world import DRIVES, Robot
 from logs.run import Run
 

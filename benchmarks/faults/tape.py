@@ -28,7 +28,7 @@ from fusion import (
     WifiScan,
 )
 from fusion.odometry import wheel_increment
-from fusion.track import order as place
+from fusion.timeline import order as place
 from fusion.values import NANOSECONDS
 from fusion.world import DRIVES
 from logs.run import Run

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import chain
 from operator import itemgetter
 from typing import Any, NamedTuple
 
@@ -50,7 +49,7 @@ class FateColumns(NamedTuple):
         """The columns of the fates of updates in time order."""
         lengths = fates_per_update(updates)
         fates = fates_of(updates)
-        kinds = np.fromiter(map(KIND_CODE.__getitem__, map(type, field(updates, 0))), np.int16, len(updates))
+        kinds = np.fromiter((KIND_CODE[type(update.measurement)] for update in updates), np.int16, len(updates))
         names = sorted({*field(fates, 1), *field(fates, 3)})
         code_of = {name: code for code, name in enumerate(names)}
         sensor, anchor = (np.fromiter(map(code_of.__getitem__, field(fates, i)), np.int16, len(fates)) for i in (1, 3))
@@ -86,9 +85,9 @@ class FateColumns(NamedTuple):
 
 def fates_of(updates: Sequence[Update]) -> list[Fate]:
     """The fates behind the rows of `FateColumns`."""
-    return list(chain.from_iterable(field(updates, 2)))
+    return [fate for update in updates for fate in update.fates]
 
 
 def fates_per_update(updates: Sequence[Update]) -> Whole:
     """How many rows of their `FateColumns` each of ``updates`` has, (n,)."""
-    return np.fromiter(map(len, field(updates, 2)), np.int64, len(updates))
+    return np.fromiter((len(update.fates) for update in updates), np.int64, len(updates))

@@ -27,19 +27,17 @@ from fusion import (
     Fate,
     Increment,
     LogError,
-    Measurement,
-    Odometry,
     Pose,
     Prior,
-    Ranges,
+    Radio,
     Tag,
     Tracker,
-    WifiScan,
     World,
+    move,
     sightings,
 )
 from fusion.belief import starting_belief
-from fusion.track import order
+from fusion.timeline import order
 from logs.run import Run, TruthTrack
 
 POSE, CALIBRATION = slice(0, 3), slice(3, 6)
@@ -94,11 +92,10 @@ def eff_pcrlb(error_m: Floats, bound_m: Floats) -> float:
 
 
 class State(NamedTuple):
-    """The bound's covariance after the last reading, and the motion since then."""
+    """The bound's covariance at ``time_ns``."""
 
     time_ns: int
     covariance: Floats
-    motion: Increment
 
 
 class AtTruth:
@@ -132,16 +129,13 @@ class AtTruth:
         covariance = np.zeros((size, size))
         covariance[POSE, POSE] = starting_belief(self._world, prior)[1].matrix
         covariance[range(3, size), range(3, size)] = self._variances
-        return State(prior.time_ns, covariance, Increment())
+        return State(prior.time_ns, covariance)
 
-    def step(self, state: State, measurement: Measurement) -> tuple[State, tuple[Fate, ...]]:
-        """Gather motion; at a scan compose it and add the scan's information."""
-        if isinstance(measurement, Odometry):
-            return state._replace(motion=state.motion.extend(measurement, self._world.robot.noise)), ()
-        if not isinstance(measurement, WifiScan | Ranges):
-            return state, ()
-        covariance, (x, y, heading) = self._moved(state, measurement.time_ns), self._pose(measurement.time_ns)
-        for sighting in sightings(self._world, measurement):
+    def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
+        """Compose the motion, and add the scan's information."""
+        time_ns = motion.time_ns if scan is None else scan.time_ns
+        covariance, (x, y, heading) = self._moved(state, motion, time_ns), self._pose(time_ns)
+        for sighting in () if scan is None else sightings(self._world, scan):
             expected, kind = sighting.expect(x, y, heading, self._world.robot.antenna_m), type(sighting.model)
             row = np.zeros(len(covariance))
             row[POSE] = expected.by_x, expected.by_y, expected.by_heading
@@ -149,11 +143,11 @@ class AtTruth:
             row[self._bias_index[sighting.anchor.id, kind]] = 1.0
             column = covariance @ row
             covariance = covariance - np.outer(column, column / (float(row @ column) + sighting.variance))
-        return State(measurement.time_ns, covariance, Increment()), ()
+        return State(time_ns, covariance), ()
 
-    def estimate(self, state: State, time_ns: int) -> Estimate:
+    def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
         """The truth, with the bound as its covariance."""
-        p = self._moved(state, time_ns)[POSE, POSE].tolist()
+        p = self._moved(state, motion, time_ns)[POSE, POSE].tolist()
         covariance = Covariance.from_matrix(p)
         return Estimate(time_ns, self._pose(time_ns), covariance)
 
@@ -162,23 +156,15 @@ class AtTruth:
         elapsed_ns = float(time_ns - self._start_ns)
         return Pose(*(float(np.interp(elapsed_ns, self._elapsed_ns, column)) for column in self._columns))
 
-    def _moved(self, state: State, time_ns: int) -> Floats:
+    def _moved(self, state: State, motion: Increment, time_ns: int) -> Floats:
         """F P Fᵀ + G Q Gᵀ over the motion up to ``time_ns``: displacement and heading are the truth's."""
-        before, after, motion = self._pose(state.time_ns), self._pose(time_ns), state.motion
-        dx, dy = after.x - before.x, after.y - before.y
-        rotation = np.eye(3)
-        c, s = math.cos(before.heading), math.sin(before.heading)
-        rotation[:2, :2] = (c, -s), (s, c)
+        before, after = self._pose(state.time_ns), self._pose(time_ns)
+        step = move(before.heading, motion)
         transition = np.eye(len(state.covariance))
-        transition[:2, 2] = -dy, dx
-        transition[POSE, CALIBRATION] = rotation @ (
-            (motion.x, motion.x_by_scale, motion.x_by_bias),
-            (motion.y, motion.y_by_scale, motion.y_by_bias),
-            (0.0, motion.heading, motion.duration_s),
-        )
-        white = Covariance(motion.xx, motion.xy, motion.xh, motion.yy, motion.yh, motion.hh).matrix
+        transition[:2, 2] = before.y - after.y, after.x - before.x
+        transition[POSE, CALIBRATION] = step.x_by_errors, step.y_by_errors, step.turn_by_errors
         covariance = transition @ state.covariance @ transition.T
-        covariance[POSE, POSE] += rotation @ white @ rotation.T
+        covariance[POSE, POSE] += step.noise.matrix
         return np.asarray(covariance)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fusion import Decision, Estimate, Ranges, Reason, Update, WifiScan
-from fusion.track import Key, order
+from fusion.timeline import Key, order
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fusion import Gyro, Increment, Measurement, Odometry, Pose, WifiScan, World
+from fusion import Gyro, Increment, Measurement, Odometry, Pose, Ranges, WifiScan, World
 from fusion.odometry import Odometer
 from logs.run import Run
 from sensors.simulation.scenario import Reality
@@ -47,13 +47,15 @@ def leg_by_leg(run: Run) -> Run:
     odometer, told = Odometer(run.world.robot), list[Measurement]()
     state, motion, since_ns = odometer.start(run.prior.time_ns), Increment(), run.prior.time_ns
     for measurement in run.measurements:
-        state, seen = odometer.advance(state, measurement)
-        for item in seen:
-            if isinstance(item, Odometry):
-                motion = motion.extend(item, run.world.robot.noise)
-            elif isinstance(item, WifiScan):
-                told += [*_leg(motion, since_ns, item.time_ns), item]
-                motion, since_ns = Increment(), item.time_ns
+        if isinstance(measurement, WifiScan | Ranges):
+            state, steps = odometer.hold(state, measurement.time_ns)
+        else:
+            state, steps = odometer.advance(state, measurement)
+        for step in steps:
+            motion = motion.extend(step, run.world.robot.noise)
+        if isinstance(measurement, WifiScan):
+            told += [*_leg(motion, since_ns, measurement.time_ns), measurement]
+            motion, since_ns = Increment(), measurement.time_ns
     return replace(run, measurements=tuple(told))
 
 

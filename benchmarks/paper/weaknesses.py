@@ -6,11 +6,11 @@ Ranges are exact, so every fix is where the robot stands, or where it is said to
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import fusion
 from benchmarks.paper.published import PROPOSED
-from fusion import Covariance, Decision, Odometry, Pose, Prior, RangeReading, Ranges, World
+from fusion import Covariance, Decision, Odometry, Pose, Prior, RangeReading, Ranges, Tracker, World
 from fusion.values import NANOSECONDS
 
 REPAIRED = "dynamic_weight_repaired"
@@ -78,29 +78,30 @@ class _Lane:
     def __init__(self, name: str, start: Pose, offset_m: float = 0.0) -> None:
         self._anchors = {key: (x + offset_m, y + offset_m) for key, (x, y) in ANCHORS_M.items()}
         rows = [{"id": key, "position_m": list(place)} for key, place in self._anchors.items()]
-        self._estimator = fusion.build(name, World.from_table({"anchors": rows}))
-        self._state: Any = self._estimator.start(Prior(0, start, Covariance.from_std(0.01, 0.01, 0.01)), 0)
+        world = World.from_table({"anchors": rows})
+        prior = Prior(0, start, Covariance.from_std(0.01, 0.01, 0.01))
+        self._tracker = Tracker(fusion.build(name, world), world, prior)
         self._seconds = 0
 
     @property
     def pose(self) -> Pose:
-        return self._estimator.estimate(self._state, self._seconds * NANOSECONDS).pose
+        return self._tracker.estimate(self._seconds * NANOSECONDS).pose
 
     def drive(self, distance_m: float, turn_rad: float) -> None:
         self._seconds += 1
         now_ns = self._seconds * NANOSECONDS
-        told = Odometry(now_ns, "wheels", self._seconds, now_ns - NANOSECONDS, distance_m, turn_rad)
-        self._state, _ = self._estimator.step(self._state, told)
+        self._tracker.push(Odometry(now_ns, "wheels", self._seconds, now_ns - NANOSECONDS, distance_m, turn_rad))
+
+    def stand(self) -> None:
+        self.drive(0.0, 0.0)
 
     def corner(self, counted_m: float, truth: Pose) -> Decision:
         self.drive(counted_m, 0.0)
         return self.fix(truth.x, truth.y)
 
     def fix(self, x: float, y: float) -> Decision:
-        """Exact ranges from (x, y)."""
-        self._seconds += 1
+        """Exact ranges from (x, y), after a second at rest."""
+        self.stand()
         readings = tuple(RangeReading(key, math.dist((x, y), place)) for key, place in self._anchors.items())
-        self._state, fates = self._estimator.step(
-            self._state, Ranges(self._seconds * NANOSECONDS, "radio", self._seconds, readings)
-        )
-        return fates[0].decision
+        (update,) = self._tracker.push(Ranges(self._seconds * NANOSECONDS, "radio", self._seconds, readings))
+        return update.fates[0].decision

@@ -15,7 +15,22 @@ from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from fusion import Decision, Estimate, Estimator, Level, LogError, ParameterError, Remark, Truth, World, build
+from fusion import (
+    Decision,
+    Estimate,
+    Estimator,
+    FusionError,
+    Level,
+    LogError,
+    Measurement,
+    Moment,
+    ParameterError,
+    Remark,
+    Timeline,
+    Truth,
+    World,
+    build,
+)
 from fusion.values import seconds
 from sensors.onboard.keeper import Received
 from sensors.onboard.live_lane import Lane
@@ -135,10 +150,11 @@ def _run(
         if patience_s is not None:
             sensing.await_open(patience_s, stop)
         prior = robot.start.prior(sensing.began_ns, robot.world)
-        lanes = [Lane(one.name, one.estimator, robot.world, prior, one.seed) for one in contestants]
+        timeline = Timeline(robot.world, prior.time_ns)
+        lanes = [Lane(one.name, one.estimator, prior, one.seed) for one in contestants]
         about = {"live_lanes": json.dumps({one.name: one.record for one in contestants})}
         with Recorder(robot, folder, prior, about) if folder else nullcontext() as recorder:
-            fold = _Fold(sensing, lanes, recorder)
+            fold = _Fold(sensing, timeline, lanes, recorder)
             try:
                 for turn in sensing.turns(stop, duration_s, 1.0 / hz):
                     fold.take(turn)
@@ -150,10 +166,12 @@ def _run(
 
 
 class _Fold:
-    """Every turn through every lane and into the log; the first lane is the one that is asked for the pose."""
+    """Every turn through every lane and into the log; the first lane is the one that is asked for the pose. Order and
+    motion are found once, for all of them.
+    """
 
-    def __init__(self, sensing: Sensing, lanes: Sequence[Lane], recorder: Recorder | None) -> None:
-        self._sensing, self._lanes = sensing, lanes
+    def __init__(self, sensing: Sensing, timeline: Timeline, lanes: Sequence[Lane], recorder: Recorder | None) -> None:
+        self._sensing, self._timeline, self._lanes = sensing, timeline, lanes
         self._kept = self._recorder = recorder
         self._measurements = 0
         self._fates: Counter[Decision] = Counter()
@@ -172,7 +190,8 @@ class _Fold:
     def now(self) -> Now:
         """The pose for this moment, and what happened since the last."""
         lane, now_ns = self._lanes[0], self._sensing.clock.now_ns()
-        estimate = lane.estimate(now_ns)
+        time_ns = max(now_ns, self._timeline.time_ns)
+        estimate = lane.estimate(self._timeline.held(time_ns), time_ns)
         fates, self._fates = self._fates, Counter()
         news, self._news = self._news, []
         statuses, warning = self._sensing.statuses(), self._sensing.warning
@@ -198,10 +217,20 @@ class _Fold:
         if isinstance(said, Truth | Remark):
             return ()
         self._measurements += 1
-        own = self._lanes[0].hear(said)
+        moments = self._moments(said)
+        own = self._lanes[0].take(moments)
         self._fates.update(fate.decision for update in own if not update.revised for fate in update.fates)
-        others = [(lane.name, update) for lane in self._lanes[1:] for update in lane.hear(said)]
+        others = [(lane.name, update) for lane in self._lanes[1:] for update in lane.take(moments)]
         return [*((self._lanes[0].name, update) for update in own), *others]
+
+    def _moments(self, measurement: Measurement) -> Sequence[Moment]:
+        """The run after a measurement; none where the front end cannot take it, which ends every lane."""
+        try:
+            return self._timeline.push(measurement)
+        except FusionError as error:
+            for lane in self._lanes:
+                lane.end(str(error))
+            return ()
 
     def _notice(self, now_ns: int) -> None:
         """Tell once of every lane that ended, and of the recording."""

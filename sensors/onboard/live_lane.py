@@ -2,43 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from fusion import Covariance, Estimate, Estimator, FusionError, Measurement, Pose, Prior, Tracker, Update, World
+from fusion import Covariance, Estimate, Estimator, Fold, FusionError, Increment, Moment, Pose, Prior, Update
 from fusion.certificate import Certificate
 
 Answer = TypeVar("Answer")
 
 
 class Lane:
-    """An estimator and what it has said so far. ``error`` is why it ended, "" while it goes on."""
+    """An estimator and its certificate so far. ``error`` is why it ended, "" while it goes on."""
 
-    def __init__(self, name: str, estimator: Estimator[Any], world: World, prior: Prior, seed: int) -> None:
+    def __init__(self, name: str, estimator: Estimator[Any], prior: Prior, seed: int) -> None:
         self.name = name
         self.error = ""
         self._certificate = Certificate()
-        self._tracker = self._guarded(lambda: Tracker(estimator, world, prior, seed=seed))
+        self._fold = self._guarded(lambda: Fold(estimator, prior, seed))
 
-    def hear(self, measurement: Measurement) -> list[Update]:
-        """What it says to one measurement, its own update first; nothing once it ended."""
-        return self._guarded(lambda: self._certified(measurement)) or []
+    def take(self, moments: Sequence[Moment]) -> list[Update]:
+        """Its updates by one measurement, the measurement's own first; none once it ended."""
+        return self._guarded(lambda: self._certified(moments)) or []
 
-    def estimate(self, time_ns: int) -> Estimate | None:
-        """Its belief at ``time_ns``; None once it ended."""
-        return self._guarded(lambda: _plain(self._tracker.estimate(time_ns)) if self._tracker else None)
+    def estimate(self, motion: Increment, time_ns: int) -> Estimate | None:
+        """Its belief at ``time_ns``, after the ``motion`` since the last epoch; None once it ended."""
+        return self._guarded(lambda: _plain(self._fold.estimate(motion, time_ns)) if self._fold else None)
 
     def end(self, error: str) -> None:
-        """Let it say no more, for a reason."""
+        """Stop it, for a reason; the first one counts."""
         self.error = self.error or error
 
     @property
     def digest(self) -> str:
-        """The certificate of all it said, as `fusion.digest`; "" once it ended."""
+        """The certificate of all its updates, as `fusion.digest`; "" once it ended."""
         return "" if self.error else self._certificate.digest
 
-    def _certified(self, measurement: Measurement) -> list[Update]:
-        updates = self._tracker.push(measurement) if self._tracker else []
+    def _certified(self, moments: Sequence[Moment]) -> list[Update]:
+        updates = [self._fold.take(moment) for moment in moments] if self._fold else []
         for update in updates:
             self._certificate.add(update)
         return updates

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.clouds import MOST_CLOUDS, MOST_POINTS, CloudWatch, thinned
 from benchmarks.lane import run_lane
-from fusion import Particles, Ranges, WifiScan
+from fusion import Increment, Moment, Particles, Ranges, WifiScan
 from logs.reader import read_run
 from sensors.simulation.simulate import simulate
 
@@ -40,16 +40,14 @@ def test_estimator_without_particles_has_no_clouds(run):
 
 
 def test_particles_that_fail_cost_their_own_lane_alone(run):
-    def refuse(tracker, measurement):
+    def refuse(fold, moment):
         raise ValueError("no particles today")
 
     assert "no particles today" in run_lane(run, "ekf", watch=refuse).error
 
 
 class Always:
-    """A tracker whose cloud is the same at all times."""
-
-    time_ns = 0
+    """A fold whose cloud is the same at all times."""
 
     def particles(self):
         return Particles(np.zeros((2, 2)), np.array([0.5, 0.5]))
@@ -58,10 +56,9 @@ class Always:
 @pytest.mark.parametrize("scans", [MOST_CLOUDS, MOST_CLOUDS + 1, 10 * MOST_CLOUDS - 1])
 def test_of_a_long_run_a_bounded_number_of_clouds_is_kept(run, scans):
     radio = tuple(Ranges(1 + k, "uwb", k, ()) for k in range(scans))
-    watch, tracker = CloudWatch(replace(run, measurements=radio)), Always()
-    for measurement in radio:
-        tracker.time_ns = measurement.time_ns
-        watch(tracker, measurement)
+    watch = CloudWatch(replace(run, measurements=radio))
+    for k, measurement in enumerate(radio):
+        watch(Always(), Moment(measurement, (), k, (), Increment(), measurement.time_ns, 0))
     clouds = watch.clouds()
     assert len(clouds.time_ns) == scans
     assert MOST_CLOUDS / 2 < len(clouds.cloud_ns) <= MOST_CLOUDS

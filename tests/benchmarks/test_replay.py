@@ -5,18 +5,30 @@ import pytest
 import fusion
 from benchmarks.bench import bench
 from benchmarks.replay import replay
-from fusion import Covariance, Estimate, Gyro, LogError, Odometry, ParameterError, PluginError, Pose, Truth
+from fusion import (
+    Covariance,
+    Estimate,
+    LogError,
+    Odometry,
+    ParameterError,
+    PluginError,
+    Pose,
+    RangeReading,
+    Ranges,
+    Truth,
+)
 from logs.reader import read_run
 from logs.writer import RunWriter
 
 TENTH_NS = 100_000_000
-WORLD = fusion.World.from_table({"name": "corridor", "bounds": {"x_min": 0, "x_max": 8, "y_min": -1, "y_max": 3}})
+ANCHORS = [{"id": name, "position_m": place} for name, place in (("a", (0, 0)), ("b", (8, 0)), ("c", (4, 3)))]
+WORLD = fusion.World.from_table({"name": "corridor", "anchors": ANCHORS})
 
 
 class Counts:
-    """Its x is the number of measurements that it was given."""
+    """Its x is the number of epochs that it was given."""
 
-    summary = "counts measurements"
+    summary = "counts epochs"
     tags = frozenset()
 
     def __init__(self, world, scale: float = 1.0):
@@ -25,10 +37,10 @@ class Counts:
     def start(self, prior, seed):
         return seed
 
-    def step(self, state, measurement):
+    def step(self, state, motion, scan):
         return state + 1, ()
 
-    def estimate(self, state, time_ns):
+    def estimate(self, state, motion, time_ns):
         return Estimate(time_ns, Pose(self.scale * state, 0.0, 0.0), Covariance.from_std(1.0, 1.0, 1.0))
 
 
@@ -40,14 +52,17 @@ def _estimator():
 
 @pytest.fixture
 def log(tmp_path):
-    """Ten increments and a gyro sample that comes half a second late."""
+    """Ten increments, three ranges, and one more that comes half a second late."""
     path = tmp_path / "run.mcap"
     with RunWriter(path, WORLD, name="run", metadata={"robot": "number five"}) as writer:
         for k in range(1, 11):
             writer.write_truth(Truth(k * TENTH_NS, 0.1 * k, 0.0, None))
             writer.write(Odometry(k * TENTH_NS, "wheels", k, (k - 1) * TENTH_NS, 0.1, 0.0))
+            if k % 3 == 0:
+                writer.write(Ranges(k * TENTH_NS, "uwb", k, (RangeReading("a", 1.0),)))
             if k == 8:
-                writer.write(Gyro(3 * TENTH_NS + 5, "gyro", 0, 0.1), log_time_ns=8 * TENTH_NS)
+                late = Ranges(3 * TENTH_NS + 5, "uwb", 100, (RangeReading("b", 2.0),))
+                writer.write(late, log_time_ns=8 * TENTH_NS)
     return path
 
 

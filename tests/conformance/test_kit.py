@@ -13,8 +13,6 @@ from fusion import (
     Decision,
     Estimate,
     Fate,
-    Increment,
-    Odometry,
     ParameterError,
     Particles,
     PluginError,
@@ -22,7 +20,6 @@ from fusion import (
     Ranges,
     Reason,
     Tag,
-    WifiScan,
     compose,
     registered,
     sightings,
@@ -32,7 +29,6 @@ from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.check import run as run_check
 from fusion.conformance import Outcome, checks, run_checks
 from fusion.promises import PROMISES
-from fusion.screen import unusable
 
 
 class State(NamedTuple):
@@ -43,7 +39,7 @@ class State(NamedTuple):
 
 
 class Correct:
-    """A gated extended Kalman filter over the pose, composed at every odometry step."""
+    """A gated extended Kalman filter over the pose."""
 
     summary = "reference"
     tags = frozenset()
@@ -55,17 +51,13 @@ class Correct:
     def start(self, prior, seed):
         return State(prior.time_ns, seed, *starting_belief(self.world, prior))
 
-    def step(self, state, measurement):
-        if isinstance(measurement, Odometry):
-            return self.move(state, measurement), ()
-        if isinstance(measurement, WifiScan | Ranges):
-            return self.see(state, measurement)
-        return state, unusable(measurement, Reason.KIND_NOT_CONSUMED)
+    def step(self, state, motion, scan):
+        moved = self.move(state, motion)
+        return (moved, ()) if scan is None else self.see(moved, scan)
 
-    def move(self, state, odometry):
-        motion = Increment().extend(odometry, self.world.robot.noise)
+    def move(self, state, motion):
         pose, covariance = compose(state.pose, state.covariance, motion)
-        return state._replace(time_ns=odometry.time_ns, pose=pose, covariance=covariance)
+        return state._replace(time_ns=motion.time_ns, pose=pose, covariance=covariance)
 
     def see(self, state, scan):
         mean, p = np.array(state.pose), np.array(state.covariance.matrix)
@@ -88,14 +80,14 @@ class Correct:
         spread = Covariance(p[0, 0], p[0, 1], p[0, 2], p[1, 1], p[1, 2], p[2, 2])
         return State(scan.time_ns, state.seed, Pose(x, y, wrap_angle(heading)), spread), tuple(fates)
 
-    def estimate(self, state, time_ns):
-        known = state.covariance.hh < HEADING_KNOWN_STD**2
-        return Estimate(time_ns, state.pose, state.covariance, heading_known=known)
+    def estimate(self, state, motion, time_ns):
+        _, _, pose, covariance = self.move(state, motion)
+        return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
 
 
 class GlobalDice(Correct):
-    def move(self, state, odometry):
-        moved = super().move(state, odometry)
+    def move(self, state, motion):
+        moved = super().move(state, motion)
         jitter = np.random.random() * 1e-9  # noqa: NPY002 - that is the fault
         return moved._replace(pose=moved.pose._replace(x=moved.pose.x + jitter))
 
@@ -109,9 +101,9 @@ class SecretSeed(Correct):
 class CountsInItself(Correct):
     steps = 0
 
-    def move(self, state, odometry):
+    def move(self, state, motion):
         self.steps += 1
-        moved = super().move(state, odometry)
+        moved = super().move(state, motion)
         return moved._replace(pose=moved.pose._replace(x=moved.pose.x + 1e-9 * self.steps))
 
 
@@ -121,21 +113,20 @@ class WritesIntoState(Correct):
     def start(self, prior, seed):
         return np.array(prior.pose)
 
-    def step(self, state, measurement):
-        if isinstance(measurement, Odometry):
-            state[0] += measurement.distance_m
+    def step(self, state, motion, scan):
+        state[0] += motion.x
         return state, ()
 
-    def estimate(self, state, time_ns):
+    def estimate(self, state, motion, time_ns):
         return Estimate(time_ns, Pose(*state.tolist()), Covariance.from_std(1.0, 1.0, 0.1))
 
 
 class EstimateAdvances(Correct):
     shift = 0.0
 
-    def estimate(self, state, time_ns):
+    def estimate(self, state, motion, time_ns):
         self.shift += 1e-9
-        found = super().estimate(state, time_ns)
+        found = super().estimate(state, motion, time_ns)
         return found._replace(pose=found.pose._replace(x=found.pose.x + self.shift))
 
 
@@ -145,9 +136,9 @@ class Unpicklable(Correct):
 
 
 class SurerLater(Correct):
-    def estimate(self, state, time_ns):
-        found = super().estimate(state, time_ns)
-        shrunk = 0.9 if time_ns > state.time_ns else 1.0
+    def estimate(self, state, motion, time_ns):
+        found = super().estimate(state, motion, time_ns)
+        shrunk = math.exp(-motion.duration_s)
         return found._replace(covariance=Covariance(*(shrunk * number for number in found.covariance)))
 
 
@@ -170,13 +161,13 @@ class NisWithoutSquare(Correct):
 
 
 class LostBeyondDoubt(Correct):
-    def estimate(self, state, time_ns):
-        return super().estimate(state, time_ns)._replace(p_lost=1.5)
+    def estimate(self, state, motion, time_ns):
+        return super().estimate(state, motion, time_ns)._replace(p_lost=1.5)
 
 
 class NegativeVariance(Correct):
-    def estimate(self, state, time_ns):
-        found = super().estimate(state, time_ns)
+    def estimate(self, state, motion, time_ns):
+        found = super().estimate(state, motion, time_ns)
         return found._replace(covariance=found.covariance._replace(yy=-0.01))
 
 
@@ -185,8 +176,8 @@ class InventedCovariance(Correct):
 
 
 class UnwrappedHeading(Correct):
-    def estimate(self, state, time_ns):
-        found = super().estimate(state, time_ns)
+    def estimate(self, state, motion, time_ns):
+        found = super().estimate(state, motion, time_ns)
         return found._replace(pose=found.pose._replace(heading=found.pose.heading + math.tau))
 
 
@@ -201,8 +192,8 @@ class NeedsWifi(Correct):
         after, fates = super().see(state, scan)
         return after._replace(seed=heard), fates
 
-    def estimate(self, state, time_ns):
-        found = super().estimate(state, time_ns)
+    def estimate(self, state, motion, time_ns):
+        found = super().estimate(state, motion, time_ns)
         silent = time_ns - state.seed > 5_000_000_000
         return found._replace(pose=Pose(math.nan, 0.0, 0.0)) if silent else found
 
@@ -210,9 +201,9 @@ class NeedsWifi(Correct):
 class AveragesHeadings(Correct):
     """Smooths its heading as if it were a length."""
 
-    def move(self, state, odometry):
-        moved = super().move(state, odometry)
-        heading = 0.5 * state.pose.heading + 0.5 * moved.pose.heading + 0.5 * odometry.turn_rad
+    def move(self, state, motion):
+        moved = super().move(state, motion)
+        heading = 0.5 * state.pose.heading + 0.5 * moved.pose.heading + 0.5 * motion.heading
         return moved._replace(pose=moved.pose._replace(heading=heading))
 
 
@@ -221,9 +212,9 @@ class RemembersTheNewest(Correct):
 
     newest_ns = 0
 
-    def move(self, state, odometry):
-        late, self.newest_ns = odometry.time_ns < self.newest_ns, max(self.newest_ns, odometry.time_ns)
-        return state if late else super().move(state, odometry)
+    def step(self, state, motion, scan):
+        late, self.newest_ns = motion.time_ns < self.newest_ns, max(self.newest_ns, motion.time_ns)
+        return (state, ()) if late else super().step(state, motion, scan)
 
 
 class HardCodedRoom(Correct):
@@ -245,28 +236,48 @@ class NoGate(Correct):
 
 
 class Backwards(Correct):
-    def move(self, state, odometry):
-        noise = self.world.robot.noise
-        motion = Increment().extend(odometry, noise)
-        pose, covariance = compose(state.pose, state.covariance, motion._replace(x=-motion.x, y=-motion.y))
-        return state._replace(time_ns=odometry.time_ns, pose=pose, covariance=covariance)
+    def move(self, state, motion):
+        return super().move(state, motion._replace(x=-motion.x, y=-motion.y))
 
 
 class ConstantCovariance(Correct):
-    def estimate(self, state, time_ns):
-        return super().estimate(state, time_ns)._replace(covariance=Covariance.from_std(0.3, 0.3, 0.1))
+    def estimate(self, state, motion, time_ns):
+        return super().estimate(state, motion, time_ns)._replace(covariance=Covariance.from_std(0.3, 0.3, 0.1))
 
 
-class NoisePerMessage(Correct):
-    def move(self, state, odometry):
-        moved = super().move(state, odometry)
+class GuessesByTheBits(Correct):
+    """Adds an error that is as good as random, and the same for the same motion to the last bit."""
+
+    def step(self, state, motion, scan):
+        after, fates = super().step(state, motion, scan)
+        error_m = hash(motion) % 1000 * 1e-4
+        return after._replace(pose=after.pose._replace(x=after.pose.x + error_m)), fates
+
+
+class NoisePerStep(Correct):
+    def move(self, state, motion):
+        moved = super().move(state, motion)
         p = moved.covariance
         return moved._replace(covariance=p._replace(xx=p.xx + 1e-3, yy=p.yy + 1e-3, hh=p.hh + 1e-3))
 
 
+class ForgetsClosedStretches(Correct):
+    def step(self, state, motion, scan):
+        return (state, ()) if scan is None else super().step(state, motion, scan)
+
+
+class FatesOfNoScan(Correct):
+    """Reports a closed stretch as if it were a scan that could not be used."""
+
+    def step(self, state, motion, scan):
+        after, fates = super().step(state, motion, scan)
+        closed = Fate(motion.time_ns, "", 0, "", Decision.UNUSABLE, Reason.KIND_NOT_CONSUMED, 0.0)
+        return after, (closed,) if scan is None else fates
+
+
 class SureOfItsHeading(Correct):
-    def estimate(self, state, time_ns):
-        return super().estimate(state, time_ns)._replace(heading_known=True)
+    def estimate(self, state, motion, time_ns):
+        return super().estimate(state, motion, time_ns)._replace(heading_known=True)
 
 
 class StartsNowhere(Correct):
@@ -280,8 +291,8 @@ class StartsNowhere(Correct):
 
 
 class TooFar(Correct):
-    def estimate(self, state, time_ns):
-        found = super().estimate(state, time_ns)
+    def estimate(self, state, motion, time_ns):
+        found = super().estimate(state, motion, time_ns)
         return found._replace(pose=found.pose._replace(x=found.pose.x + 0.6))
 
 
@@ -325,8 +336,8 @@ class MovedByBeingSeen(WithParticles):
         self.shift += 1e-9
         return super().particles(state)
 
-    def estimate(self, state, time_ns):
-        found = super().estimate(state, time_ns)
+    def estimate(self, state, motion, time_ns):
+        found = super().estimate(state, motion, time_ns)
         return found._replace(pose=found.pose._replace(x=found.pose.x + self.shift))
 
 
@@ -354,7 +365,10 @@ BROKEN = {
     NoGate: "outlier-is-bounded",
     Backwards: "forward-is-forward",
     ConstantCovariance: "silence-is-told",
-    NoisePerMessage: "rate-means-nothing",
+    GuessesByTheBits: "rate-means-nothing",
+    NoisePerStep: "closing-changes-little",
+    ForgetsClosedStretches: "closing-changes-little",
+    FatesOfNoScan: "closing-changes-little",
     SureOfItsHeading: "unknown-heading",
     StartsNowhere: "global-start",
     HeavyParticles: "particles",

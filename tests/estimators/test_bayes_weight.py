@@ -11,7 +11,6 @@ from estimators.bayes_weight import BayesWeight
 from fusion import (
     Covariance,
     Decision,
-    Gyro,
     Odometry,
     ParameterError,
     Pose,
@@ -25,6 +24,7 @@ from fusion import (
 )
 from fusion.trilateration import Fix
 from fusion.values import NANOSECONDS as SECOND
+from tests.estimators.stepping import Stepped
 
 PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0), "d": (9.0, 7.0)}
 AREA = 30.0 * 40.0
@@ -161,12 +161,11 @@ def test_outliers_are_refused_on_the_way_and_the_track_stays():
 
 def test_heading_is_corrected_through_its_covariance_with_the_position():
     """After 5 m straight ahead a fix to the left says that the heading was too far right."""
-    estimator = BayesWeight(world())
-    state = estimator.start(Prior(0, Pose(0.0, 3.0, 0.0), Covariance.from_std(0.05, 0.05, 0.2)), 0)
-    state, _ = estimator.step(state, Odometry(SECOND, "wheels", 1, 0, 5.0, 0.0))
-    before = estimator.estimate(state, SECOND)
-    state, fates = estimator.step(state, scan(10, 5.0, 3.5))
-    after = estimator.estimate(state, SECOND)
+    robot = Stepped(BayesWeight(world()), Prior(0, Pose(0.0, 3.0, 0.0), Covariance.from_std(0.05, 0.05, 0.2)))
+    robot.feed(Odometry(SECOND, "wheels", 1, 0, 5.0, 0.0))
+    before = robot.estimate(SECOND)
+    fates = robot.feed(scan(10, 5.0, 3.5))
+    after = robot.estimate(SECOND)
     assert {f.decision for f in fates} == {Decision.USED}
     assert 0.05 < after.pose.heading < 0.15
     assert after.covariance.hh < 0.5 * before.covariance.hh
@@ -220,20 +219,17 @@ def test_errors_are_as_large_as_claimed_on_the_model_it_assumes():
 
 
 def test_each_reading_is_used_once_and_anchors_may_come_one_by_one():
-    estimator = BayesWeight(world())
-    state = estimator.start(Prior(0, BELIEF, SPREAD), 0)
+    robot = Stepped(BayesWeight(world()), Prior(0, BELIEF, SPREAD))
     reasons = []
     for k, name in enumerate("abccab", start=1):
-        state, fates = estimator.step(state, scan(k, 4.0, 3.0, (name,)))
-        reasons += [f.reason for f in fates]
+        reasons += [f.reason for f in robot.feed(scan(k, 4.0, 3.0, (name,)))]
     assert reasons == [Reason.TOO_FEW_ANCHORS, Reason.TOO_FEW_ANCHORS, Reason.OK] * 2
 
 
 def test_fates_carry_weight_innovation_and_nis_of_every_anchor():
     """Anchor a, seen from (4, 3): 5 m. A fix at (4.4, 3.3) reads 5.5 m."""
-    estimator = BayesWeight(world())
     belief = Prior(0, Pose(4.0, 3.0, 0.0), Covariance.from_std(0.3, 0.3, 0.1))
-    _, fates = estimator.step(estimator.start(belief, 0), scan(1, 4.4, 3.3))
+    fates = Stepped(BayesWeight(world()), belief).feed(scan(1, 4.4, 3.3))
     assert [f.anchor for f in fates] == sorted(PLACES)
     assert len({f.weight for f in fates}) == 1
     assert fates[0].innovation == pytest.approx(0.5)
@@ -244,19 +240,20 @@ def test_fates_carry_weight_innovation_and_nis_of_every_anchor():
 @pytest.mark.parametrize("corner", [(4.0, 3.0), (18.0, 23.0), (-9.0, 24.0)])
 def test_unknown_position_is_invalid_until_the_first_fix_wherever_on_the_floor(corner):
     place, nowhere = world(), Pose(math.nan, math.nan, math.nan)
-    estimator = BayesWeight(place, outlier_probability=0.2)
-    state = estimator.start(prior(nowhere, position_known=False, heading_known=False), 0)
-    before = estimator.estimate(state, 0)
-    state, fates = estimator.step(state, scan(1, *corner))
-    after = estimator.estimate(state, SECOND)
+    robot = Stepped(
+        BayesWeight(place, outlier_probability=0.2), prior(nowhere, position_known=False, heading_known=False)
+    )
+    before = robot.estimate(0)
+    fates = robot.feed(scan(1, *corner))
+    after = robot.estimate(SECOND)
     assert not before.valid
     assert np.isfinite([*before.pose, *before.covariance]).all()
     assert after.valid
     assert not after.heading_known
     assert fates[0].weight == pytest.approx(0.8)
     for k in range(2, 8):
-        state, _ = estimator.step(state, scan(k, *corner))
-    assert math.dist(estimator.estimate(state, SECOND).pose[:2], corner) < 0.5
+        robot.feed(scan(k, *corner))
+    assert math.dist(robot.estimate(SECOND).pose[:2], corner) < 0.5
 
 
 def test_unknown_heading_is_found_by_driving():
@@ -267,12 +264,13 @@ def test_unknown_heading_is_found_by_driving():
     assert math.dist(updates[-1].estimate.pose[:2], truth[-1]) < 0.3
 
 
-def test_a_gyro_is_not_consumed():
-    estimator = BayesWeight(world())
-    state = estimator.start(prior(), 0)
-    same, fates = estimator.step(state, Gyro(SECOND, "gyro", 1, 0.1))
-    assert same == state
-    assert fates[0].reason is Reason.KIND_NOT_CONSUMED
+def test_stretch_without_radio_moves_the_belief_and_leaves_waiting_readings_waiting():
+    robot = Stepped(BayesWeight(world()), prior())
+    robot.feed(scan(1, 4.0, 3.0, ("a",)), Odometry(SECOND, "wheels", 1, SECOND // 10, 1.0, 0.3))
+    before, waiting = robot.estimate(SECOND), robot.state.recent
+    assert robot.close() == ()
+    assert robot.state.recent == waiting != ()
+    assert robot.estimate(SECOND) == before
 
 
 @pytest.mark.parametrize("options", [{"outlier_probability": -0.1}, {"outlier_probability": 1.0}, {"window_s": -1.0}])

@@ -9,7 +9,6 @@ from estimators.dynamic_weight import DynamicWeight, allocate, weighted_average
 from fusion import (
     Covariance,
     Decision,
-    Gyro,
     Odometry,
     ParameterError,
     Pose,
@@ -22,6 +21,7 @@ from fusion import (
     World,
 )
 from fusion.values import NANOSECONDS as SECOND
+from tests.estimators.stepping import Stepped
 
 PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0)}
 START = Pose(4.0, 3.0, 0.0)
@@ -42,27 +42,27 @@ class Robot:
     """Feeds one estimator, one measurement a second."""
 
     def __init__(self, place=None, start=START, known=None, places=PLACES, **options):
-        self.estimator = DynamicWeight(place or world(places), **options)
         prior = Prior(0, start, Covariance.from_std(0.1, 0.1, 0.1), **(known or {}))
-        self.state, self.places, self.k = self.estimator.start(prior, 0), places, 0
+        self.stepped = Stepped(DynamicWeight(place or world(places), **options), prior)
+        self.places, self.k = places, 0
 
     def scan(self, x, y, heard="abc"):
         """Exact ranges from (x, y); answers the Fates."""
         self.k += 1
         readings = tuple(RangeReading(n, math.dist((x, y), self.places[n])) for n in heard)
-        return self.step(Ranges(self.k * SECOND, "uwb", self.k, readings))
+        return self.stepped.feed(Ranges(self.k * SECOND, "uwb", self.k, readings))
 
     def drive(self, distance, turn=0.0):
         self.k += 1
-        self.step(Odometry(self.k * SECOND, "wheels", self.k, (self.k - 1) * SECOND, distance, turn))
+        self.stepped.feed(Odometry(self.k * SECOND, "wheels", self.k, (self.k - 1) * SECOND, distance, turn))
 
-    def step(self, measurement):
-        self.state, fates = self.estimator.step(self.state, measurement)
-        return fates
+    @property
+    def state(self):
+        return self.stepped.state
 
     @property
     def estimate(self):
-        return self.estimator.estimate(self.state, self.k * SECOND)
+        return self.stepped.estimate(self.k * SECOND)
 
     @property
     def position(self):
@@ -106,7 +106,7 @@ def test_algorithm_1_line_4_trilaterates_signal_strengths():
     radio = {"reference_rssi_dbm": -40.0, "path_loss_exponent": 2.0}
     robot = Robot(World.from_table({"anchors": anchors, "radio": radio}), Pose(4.2, 2.8, 0.0))
     heard = {"a": -53.979400, "b": -53.979400, "c": -52.552725}
-    robot.step(WifiScan(SECOND, "wifi", 1, tuple(RssiReading(name, dbm) for name, dbm in heard.items())))
+    robot.stepped.feed(WifiScan(SECOND, "wifi", 1, tuple(RssiReading(name, dbm) for name, dbm in heard.items())))
     assert robot.position == pytest.approx((4.1, 2.9), abs=1e-5)
 
 
@@ -280,10 +280,25 @@ def test_unknown_position_starts_at_the_first_fix(feedback):
     assert robot.position == pytest.approx((4.5, 2.8))
 
 
-def test_no_covariance_is_claimed_and_a_gyro_is_not_consumed():
-    robot = Robot()
-    assert robot.estimate.covariance is None
-    assert robot.step(Gyro(SECOND, "gyro", 1, 0.1))[0].reason is Reason.KIND_NOT_CONSUMED
+@pytest.mark.parametrize("feedback", [True, False])
+def test_stretch_without_radio_is_motion_alone(feedback):
+    """1 m of a drive of 2 m is closed, after an outlier: weights and counter stay, the rest goes on from there."""
+    robot, closed = Robot(feedback=feedback), Robot(feedback=feedback)
+    for one in (robot, closed):
+        one.scan(*BAD)
+        one.drive(1.0, 0.4)
+    before = closed.state
+    assert closed.stepped.close() == ()
+    assert (closed.state.odo_counter, closed.state.wifi_weight) == (before.odo_counter, before.wifi_weight) == (1, 0.0)
+    for one in (robot, closed):
+        one.drive(1.0)
+        one.scan(5.8, 3.6)
+    assert closed.estimate.pose == pytest.approx(robot.estimate.pose)
+    assert closed.state.travelled_m == robot.state.travelled_m == 2.0
+
+
+def test_no_covariance_is_claimed():
+    assert Robot().estimate.covariance is None
 
 
 @pytest.mark.parametrize(

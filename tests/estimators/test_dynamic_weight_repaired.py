@@ -22,6 +22,7 @@ from fusion import (
 )
 from fusion.trilateration import Fix
 from fusion.values import NANOSECONDS as SECOND
+from tests.estimators.stepping import Stepped
 
 PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0)}
 START = Pose(4.0, 3.0, 0.0)
@@ -35,7 +36,7 @@ def world(arm=(0.0, 0.0, 0.0), std_m=0.1):
 
 def believing(counter=0, std=0.3, known=True):
     """At the origin, standing still, with 0.3 m per axis."""
-    return State(Pose(0.0, 0.0, 0.0), Covariance.from_std(std, std, 0.1), Increment(), counter, (), known)
+    return State(Pose(0.0, 0.0, 0.0), Covariance.from_std(std, std, 0.1), counter, (), known)
 
 
 def weigh(away, counter=0, known=True, **options):
@@ -49,12 +50,9 @@ def scan(k, x, y, heard="abc"):
 
 
 def fed(estimator, measurements, start=START, std=0.1, **known):
-    state = estimator.start(Prior(0, start, Covariance.from_std(std, std, 0.1), **known), 0)
-    fates = []
-    for measurement in measurements:
-        state, said = estimator.step(state, measurement)
-        fates.append(said)
-    return state, fates
+    """The estimator after all measurements, and the Fates of each."""
+    robot = Stepped(estimator, Prior(0, start, Covariance.from_std(std, std, 0.1), **known))
+    return robot, [robot.feed(measurement) for measurement in measurements]
 
 
 @pytest.mark.parametrize(
@@ -108,7 +106,8 @@ def test_average_covers_its_errors_wherever_the_antenna_sits():
 
 
 def test_outliers_are_refused_and_leave_position_and_covariance_to_odometry():
-    (state, (fates,)) = fed(DynamicWeightRepaired(world()), [scan(1, 7.0, 3.0)])
+    robot, (fates,) = fed(DynamicWeightRepaired(world()), [scan(1, 7.0, 3.0)])
+    state = robot.state
     assert {(f.decision, f.reason, f.weight) for f in fates} == {(Decision.REJECTED, Reason.OUTLIER, 0.0)}
     assert (state.pose, state.odo_counter) == (START, 1)
     assert (state.covariance.xx, state.covariance.yy) == pytest.approx((0.01, 0.01))
@@ -119,29 +118,37 @@ def test_outliers_are_refused_and_leave_position_and_covariance_to_odometry():
 def test_lock_out_is_cured_by_the_widening_gate_and_by_nothing_else(away):
     """Told to be ``away`` metres from where it stands, sure to 10 cm; every fix is exact."""
     start, fixes = Pose(4.0 + away, 3.0, 0.0), [scan(k, 4.0, 3.0) for k in range(1, 41)]
-    state, fates = fed(DynamicWeightRepaired(world()), fixes, start)
+    robot, fates = fed(DynamicWeightRepaired(world()), fixes, start)
     assert fates[0][0].decision is Decision.REJECTED
-    assert math.dist(state.pose[:2], (4.0, 3.0)) < 0.01
+    assert math.dist(robot.state.pose[:2], (4.0, 3.0)) < 0.01
     for stubborn in (DynamicWeightRepaired(world(), widening=0.0), DynamicWeight(world())):
         stuck, fates = fed(stubborn, fixes, start)
         assert {f.decision for said in fates for f in said} == {Decision.REJECTED}
-        assert math.dist(stubborn.estimate(stuck, 40 * SECOND).pose[:2], (4.0, 3.0)) == pytest.approx(away)
+        assert math.dist(stuck.estimate(40 * SECOND).pose[:2], (4.0, 3.0)) == pytest.approx(away)
 
 
 def test_unknown_position_believes_the_first_fix_whole():
     nowhere = Pose(math.nan, math.nan, 0.0)
-    state, (fates,) = fed(DynamicWeightRepaired(world()), [scan(1, 6.0, 2.0)], nowhere, position_known=False)
-    assert state.pose[:2] == pytest.approx((6.0, 2.0))
+    robot, (fates,) = fed(DynamicWeightRepaired(world()), [scan(1, 6.0, 2.0)], nowhere, position_known=False)
+    assert robot.state.pose[:2] == pytest.approx((6.0, 2.0))
     assert [f.innovation for f in fates] == [None] * 3
-    assert not DynamicWeightRepaired(world()).estimate(believing(known=False), 0).valid
+    assert not DynamicWeightRepaired(world()).estimate(believing(known=False), Increment(), 0).valid
 
 
 def test_two_anchors_give_no_fix_and_motion_goes_on():
     step = Odometry(SECOND, "wheels", 1, 0, 0.5, 0.0)
-    estimator = DynamicWeightRepaired(world())
-    state, (_, fates) = fed(estimator, [step, scan(2, 4.5, 3.0, heard="ab")])
+    robot, (_, fates) = fed(DynamicWeightRepaired(world()), [step, scan(2, 4.5, 3.0, heard="ab")])
     assert {f.reason for f in fates} == {Reason.TOO_FEW_ANCHORS}
-    assert estimator.estimate(state, 2 * SECOND).pose[:2] == pytest.approx((4.5, 3.0))
+    assert robot.estimate(2 * SECOND).pose[:2] == pytest.approx((4.5, 3.0))
+
+
+def test_stretch_without_radio_is_motion_alone():
+    step = Odometry(SECOND, "wheels", 1, 0, 0.5, 0.2)
+    robot, _ = fed(DynamicWeightRepaired(world()), [scan(0, 7.0, 3.0), step])
+    before = robot.estimate(SECOND)
+    assert robot.close() == ()
+    assert robot.state.odo_counter == 1
+    assert robot.estimate(SECOND) == before
 
 
 @pytest.mark.parametrize(

@@ -205,7 +205,9 @@ def test_covariance_of_a_motion_does_not_depend_on_the_message_rate(rate):
     )
     for k in range(10 * rate):
         motion = motion.extend(Odometry((k + 1) * SECOND // rate, "w", k, k * SECOND // rate, 0.3 / rate, 0.0), noise)
-    assert motion.xx == pytest.approx(noise.distance_std_per_sqrt_m**2 * 3.0 + noise.distance_std_per_sqrt_s**2 * 10.0)
+    assert motion.covariance.xx == pytest.approx(
+        noise.distance_std_per_sqrt_m**2 * 3.0 + noise.distance_std_per_sqrt_s**2 * 10.0
+    )
 
 
 @pytest.mark.parametrize("drive_", [("skid_steer", (3, 5, 3, 5)), ("differential", (3, 5))])
@@ -265,14 +267,11 @@ def test_gyro_gives_the_turn_where_the_world_says_so():
 
 
 def test_motion_held_up_to_a_radio_reading_is_counted_once():
-    odometer, state, seen = Odometer(Robot()), Odometer(Robot()).start(0), []
-    for measurement in (
-        Odometry(SECOND, "w", 0, 0, 1.0, 0.2),
-        Ranges(SECOND + SECOND // 4, "r", 0, (RangeReading("a", 1.0),)),
-        Odometry(2 * SECOND, "w", 1, SECOND, 0.8, -0.1),
-    ):
-        state, out = odometer.advance(state, measurement)
-        seen += [m for m in out if isinstance(m, Odometry)]
+    odometer = Odometer(Robot())
+    state, first = odometer.advance(odometer.start(0), Odometry(SECOND, "w", 0, 0, 1.0, 0.2))
+    state, held = odometer.hold(state, SECOND + SECOND // 4)
+    _, rest = odometer.advance(state, Odometry(2 * SECOND, "w", 1, SECOND, 0.8, -0.1))
+    seen = (*first, *held, *rest)
     assert [m.time_ns for m in seen] == [SECOND, SECOND + SECOND // 4, 2 * SECOND]
     assert sum(m.distance_m for m in seen) == pytest.approx(1.8)
     assert sum(m.turn_rad for m in seen) == pytest.approx(0.1)

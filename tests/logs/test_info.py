@@ -280,12 +280,12 @@ class Stubborn:
     def start(self, prior, seed):
         return 0
 
-    def step(self, state, measurement):
-        if isinstance(measurement, WifiScan):
+    def step(self, state, motion, scan):
+        if isinstance(scan, WifiScan):
             return state + 1, (1 / (1 - state),)
         return state, ()
 
-    def estimate(self, state, time_ns):
+    def estimate(self, state, motion, time_ns):
         return Estimate(time_ns, Pose(0.0, 0.0, 0.0), None)
 
 

@@ -47,12 +47,12 @@ class Breaks:
     def start(self, prior, seed):
         return prior.pose
 
-    def step(self, state, measurement):
-        if isinstance(measurement, WifiScan):
+    def step(self, state, motion, scan):
+        if isinstance(scan, WifiScan):
             raise ZeroDivisionError("no such weight")
         return state, ()
 
-    def estimate(self, state, time_ns):
+    def estimate(self, state, motion, time_ns):
         return Estimate(time_ns, state, None)
 
 
@@ -66,18 +66,18 @@ class NeverStarts(Breaks):
 class SaysNonsense(Breaks):
     """Its x is a word."""
 
-    def step(self, state, measurement):
+    def step(self, state, motion, scan):
         return state, ()
 
-    def estimate(self, state, time_ns):
+    def estimate(self, state, motion, time_ns):
         return Estimate(time_ns, Pose("here", 0.0, 0.0), None)
 
 
 class HasNoMessage(Breaks):
     """Its heading is a number that no quaternion holds."""
 
-    def step(self, state, measurement):
-        return state._replace(heading=math.inf) if isinstance(measurement, WifiScan) else state, ()
+    def step(self, state, motion, scan):
+        return state._replace(heading=math.inf) if isinstance(scan, WifiScan) else state, ()
 
 
 @pytest.fixture(autouse=True)

@@ -12,7 +12,6 @@ from fusion import (
     Increment,
     LogError,
     MotorCommand,
-    Odometry,
     ParameterError,
     Pose,
     Ranges,
@@ -78,10 +77,12 @@ def dead_reckoned(scenario, seed=0):
             place = start.compose(motion.pose)
             errors.append(math.dist((place.x, place.y), (message.x, message.y)))
             continue
-        state, seen = odometer.advance(state, message)
-        for odometry in seen:
-            if isinstance(odometry, Odometry):
-                motion = motion.extend(odometry, scenario.world.robot.noise)
+        if isinstance(message, WifiScan | Ranges):
+            state, steps = odometer.hold(state, message.time_ns)
+        else:
+            state, steps = odometer.advance(state, message)
+        for odometry in steps:
+            motion = motion.extend(odometry, scenario.world.robot.noise)
     return np.array(errors)
 
 

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections import Counter
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from benchmarks.prior import starting_prior
 from fusion import Gyro, MeasurementError, Odometry, ParameterError, Ranges, RssiReading, WheelTicks, WifiScan
 from fusion.drive import Drive
 from fusion.odometry import Odometer
-from fusion.track import order
+from fusion.timeline import order
 from fusion.values import nanoseconds, seconds
 from fusion.world import DRIVES
 from logs.run import Run
@@ -45,6 +45,11 @@ WINDOWS = ((5.0, 9.0), (12.0, 14.0))
 
 def struck_by(*faults, run=RUN, suite_seed=20240501, fault_id="f", seed=0):
     return apply_faults(run, faults, suite_seed=suite_seed, fault_id=fault_id, seed=seed)
+
+
+def content(run):
+    """Every field of a run: two runs themselves are equal only if they are one."""
+    return {field.name: getattr(run, field.name) for field in fields(run)}
 
 
 def of_kind(run, kind):
@@ -99,7 +104,7 @@ TABLES = {
 def test_every_kind_can_be_read_and_changes_the_run(kind):
     fault = read_fault({"kind": kind, **TABLES[kind]}, "faults[0]")
     assert (fault.kind, type(fault)) == (kind, KINDS[kind])
-    assert struck_by(fault) != RUN
+    assert content(struck_by(fault)) != content(RUN)
 
 
 @pytest.mark.parametrize(
@@ -177,9 +182,9 @@ def test_seed_has_the_values_that_every_implementation_must_find():
 @pytest.mark.parametrize("fault", CHANCY, ids=lambda fault: fault.place)
 def test_same_seed_is_the_same_draw_and_another_is_another(fault):
     once = struck_by(fault, seed=4)
-    assert struck_by(fault, seed=4) == once
+    assert content(struck_by(fault, seed=4)) == content(once)
     for other in ({"seed": 5}, {"seed": 4, "suite_seed": 1}, {"seed": 4, "fault_id": "g"}):
-        assert struck_by(fault, **other) != once
+        assert content(struck_by(fault, **other)) != content(once)
     renamed = struck_by(fault, run=replace(RUN, name="office-4"), seed=4)
     assert (renamed.measurements, renamed.prior) != (once.measurements, once.prior)
 
@@ -227,14 +232,14 @@ def test_negative_seed_is_refused(seeds):
 
 @pytest.mark.parametrize("run", [RUN, INCREMENTS], ids=lambda run: run.name)
 def test_no_fault_changes_nothing(run):
-    assert struck_by(run=run) == run
+    assert content(struck_by(run=run)) == content(run)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if "windows" in KINDS[kind].__dataclass_fields__])
 @pytest.mark.parametrize("windows", [[], [[1e6, 2e6]]], ids=["none", "past the end"])
 def test_windows_without_messages_change_nothing(kind, windows):
     fault = read_fault({"kind": kind, **TABLES[kind], "windows": windows}, "faults[0]")
-    assert struck_by(fault) == RUN
+    assert content(struck_by(fault)) == content(RUN)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -243,7 +248,8 @@ def test_log_truth_and_world_are_never_touched(kind):
     assert faulty.truth is RUN.truth
     assert faulty.world is RUN.world
     changed = {} if kind == "bad_start" else {"prior": RUN.prior}
-    assert replace(faulty, measurements=RUN.measurements, prior=RUN.prior, true_stamps={}) == RUN
+    restored = replace(faulty, measurements=RUN.measurements, prior=RUN.prior, true_stamps={})
+    assert content(restored) == content(RUN)
     assert all(getattr(faulty, name) == value for name, value in changed.items())
 
 
@@ -369,7 +375,7 @@ def test_burst_losses_are_as_many_and_as_long_as_their_probabilities_say():
 
 
 def test_burst_that_never_begins_loses_nothing_and_one_that_never_ends_all_that_follows():
-    assert struck_by(Drop("gyro", p_enter=0.0, p_exit=0.5)) == RUN
+    assert content(struck_by(Drop("gyro", p_enter=0.0, p_exit=0.5))) == content(RUN)
     left = [m.seq for m in of_kind(struck_by(Drop("gyro", p_enter=0.02, p_exit=0.0)), Gyro)]
     assert 0 < len(left) < len(of_kind(RUN, Gyro))
     assert left == [m.seq for m in of_kind(RUN, Gyro)][: len(left)]
@@ -589,8 +595,11 @@ def test_kidnapped_robot_measures_no_motion_and_hears_nothing(run):
     odometer = Odometer(run.world.robot)
     state, moved = odometer.start(start_ns), []
     for measurement in faulty.measurements:
-        state, seen = odometer.advance(state, measurement)
-        moved += [m for m in seen if isinstance(m, Odometry) and m.sensor != "held" and is_in(m, *carried)]
+        if isinstance(measurement, WifiScan | Ranges):
+            state, _ = odometer.hold(state, measurement.time_ns)
+            continue
+        state, steps = odometer.advance(state, measurement)
+        moved += [step for step in steps if is_in(step, *carried)]
     assert moved
     assert all(abs(m.distance_m) + abs(m.turn_rad) < 1e-12 for m in moved[1:])
     assert {m.rate_rad_s for m in of_kind(faulty, Gyro) if is_in(m, *carried)} == {run.world.robot.gyro_bias_rad_s}

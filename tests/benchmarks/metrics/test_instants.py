@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from benchmarks.metrics.instants import evaluation_instants, interpolate_truth, known_truth, match
 from benchmarks.metrics.track import Track
 from fusion import Covariance, Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, Update
-from fusion.track import order
+from fusion.timeline import order
 from logs.run import TruthTrack
 
 SECOND = 1_000_000_000
@@ -26,9 +26,9 @@ def truth_at(stamps_ns, x=None, heading=None):
     )
 
 
-def update_at(time_ns, x=0.0, *, stamp_ns=None, fates=(), **claims):
-    estimate = Estimate(time_ns if stamp_ns is None else stamp_ns, Pose(x, 0.0, 0.0), None, **claims)
-    return Update(Odometry(time_ns, "wheels", time_ns, time_ns - 1, 0.0, 0.0), estimate, fates)
+def update_at(time_ns, x=0.0, *, stamp_ns=None, fates=(), revised=False, covariance=None, **claims):
+    estimate = Estimate(time_ns if stamp_ns is None else stamp_ns, Pose(x, 0.0, 0.0), covariance, **claims)
+    return Update(Odometry(time_ns, "wheels", time_ns, time_ns - 1, 0.0, 0.0), estimate, fates, revised=revised)
 
 
 def test_slow_truth_is_taken_at_its_own_stamps():
@@ -104,7 +104,7 @@ def test_an_answer_about_the_past_counts_only_once_it_was_received():
 
 def test_a_late_message_replaces_the_newest_answer_only_by_its_revision():
     instants = evaluation_instants(truth_at([10, 20]), hz=1e9)
-    late = [update_at(10, 1.0), update_at(5, 2.0), update_at(10, 3.0)._replace(revised=True)]
+    late = [update_at(10, 1.0), update_at(5, 2.0), update_at(10, 3.0, revised=True)]
     assert match(instants, Track.of(late)).x.tolist() == [3.0, 3.0]
 
 
@@ -131,9 +131,8 @@ def test_age_is_that_of_the_newest_answer_and_infinite_before_the_first():
 
 def ranges_at(time_ns, decision, weight):
     fate = Fate(time_ns, "uwb", time_ns, "a", decision, Reason.OK, weight)
-    return update_at(time_ns, fates=(fate,))._replace(
-        measurement=Ranges(time_ns, "uwb", time_ns, (RangeReading("a", 1.0),))
-    )
+    ranges = Ranges(time_ns, "uwb", time_ns, (RangeReading("a", 1.0),))
+    return Update(ranges, update_at(time_ns).estimate, (fate,))
 
 
 def test_time_since_the_last_fix_counts_from_radio_that_was_believed():
@@ -153,7 +152,7 @@ def test_time_since_the_last_fix_counts_from_radio_that_was_believed():
 def test_track_alone_is_matched_as_its_updates_were():
     claimed = Covariance(1.0, 0.1, 0.2, 2.0, 0.3, 3.0)
     updates = [update_at(k * SECOND, float(k)) for k in (0, 1, 1, 3)]
-    updates[1] = updates[1]._replace(estimate=updates[1].estimate._replace(covariance=claimed, valid=False))
+    updates[1] = update_at(SECOND, 1.0, covariance=claimed, valid=False)
     instants = evaluation_instants(truth_at(np.arange(-1, 6) * SECOND))
     by_updates = match(instants, Track.of(updates))
     by_track = match(instants, Track.of_estimates([update.estimate for update in updates]))

@@ -181,7 +181,8 @@ def test_no_covariance_claimed_means_no_consistency_figure():
 
 def test_certainty_that_is_wrong_is_infinitely_inconsistent():
     updates = oracle_updates(10)
-    certain = [u._replace(estimate=u.estimate._replace(covariance=Covariance(*[0.0] * 6))) for u in updates]
+    sure = Covariance(*[0.0] * 6)
+    certain = [Update(u.measurement, u.estimate._replace(covariance=sure), u.fates) for u in updates]
     scores = scores_of(certain)
     assert scores["anees"] == math.inf
     assert scores["cover95"] == 0.0

@@ -93,10 +93,10 @@ class Broken:
     def start(self, prior, seed):
         raise ZeroDivisionError
 
-    def step(self, state, measurement):
+    def step(self, state, motion, scan):
         return state, ()
 
-    def estimate(self, state, time_ns):
+    def estimate(self, state, motion, time_ns):
         raise NotImplementedError
 
 

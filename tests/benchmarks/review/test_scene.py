@@ -27,7 +27,6 @@ from fusion import (
     Estimate,
     Fate,
     FusionError,
-    Odometry,
     Pose,
     Reason,
     RssiReading,
@@ -65,28 +64,28 @@ class Straight:
     def start(self, prior, seed):
         return 0
 
-    def step(self, state, measurement):
-        if isinstance(measurement, Odometry):
+    def step(self, state, motion, scan):
+        if scan is None:
             return state, ()
         decision, reason = ((Decision.USED, Reason.OK), (Decision.REJECTED, Reason.GATE))[state % 2]
-        head = measurement.time_ns, measurement.sensor, measurement.seq
+        head = scan.time_ns, scan.sensor, scan.seq
         weight = float(decision is Decision.USED)
-        fates = [Fate(*head, r.anchor, decision, reason, weight, 1.0, 4.0, 0.25) for r in measurement.readings]
+        fates = [Fate(*head, r.anchor, decision, reason, weight, 1.0, 4.0, 0.25) for r in scan.readings]
         return state + 1, tuple(fates)
 
-    def estimate(self, state, time_ns):
+    def estimate(self, state, motion, time_ns):
         return Estimate(time_ns, Pose(time_ns / SECOND_NS - 100.0, 0.5, 0.0), VARIANCES)
 
 
 class Silent(Straight):
     """Never has a valid answer."""
 
-    def estimate(self, state, time_ns):
-        return super().estimate(state, time_ns)._replace(valid=False)
+    def estimate(self, state, motion, time_ns):
+        return super().estimate(state, motion, time_ns)._replace(valid=False)
 
 
 class Broken(Straight):
-    def step(self, state, measurement):
+    def step(self, state, motion, scan):
         raise ZeroDivisionError("on purpose")
 
 

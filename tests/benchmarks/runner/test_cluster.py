@@ -55,8 +55,8 @@ class Hangs:
     def __init__(self, world): pass
     def start(self, prior, seed):
         while True: time.sleep(60.0)
-    def step(self, state, measurement): raise NotImplementedError
-    def estimate(self, state, time_ns): raise NotImplementedError
+    def step(self, state, motion, scan): raise NotImplementedError
+    def estimate(self, state, motion, time_ns): raise NotImplementedError
 
 class Eats(Hangs):
     def start(self, prior, seed):

@@ -1,0 +1,361 @@
+"""Motion pre-integrated may be cut and joined anywhere; where the host cuts it depends on the data alone."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fusion import (
+    Covariance,
+    Decision,
+    Gyro,
+    Increment,
+    MeasurementError,
+    Odometry,
+    OdometryNoise,
+    Pose,
+    RangeReading,
+    Ranges,
+    Reason,
+    WheelTicks,
+    compose,
+    move,
+)
+from fusion.epochs import LONGEST, FrontEnd, Longest
+from tests.fusion.streams import (
+    MILLISECOND,
+    SECOND,
+    WORLD,
+    epochs_of,
+    joined,
+    late_streams,
+    moments_of,
+    odometry,
+    ranges,
+    steps,
+    streams,
+)
+
+NOISE = OdometryNoise()
+GYRO_WORLD = replace(WORLD, robot=replace(WORLD.robot, turn_source="gyro"))
+SHORT = Longest(path_m=0.6, turn_rad=2.5, duration_s=0.7)
+NEVER = Longest(math.inf, math.inf, math.inf)
+
+
+def integrated(odometries, time_ns=0):
+    motion = Increment(time_ns=time_ns)
+    for step in odometries:
+        motion = motion.extend(step, NOISE)
+    return motion
+
+
+def numbers(motion):
+    """Everything in an increment, flat."""
+    x, y, heading, covariance, *rest = motion
+    return [x, y, heading, *covariance, *rest]
+
+
+def close(motion):
+    return pytest.approx(numbers(motion), rel=1e-9, abs=1e-10)
+
+
+# --- an increment and its derivatives --------------------------------------------------------------------------------
+
+
+@given(steps(), st.integers(0, 25))
+def test_motion_cut_anywhere_and_joined_is_the_whole(odometries, cut):
+    first, second = odometries[:cut], odometries[cut:]
+    before = integrated(first)
+    joined_again = before.then(integrated(second, before.time_ns))
+    assert numbers(joined_again) == close(integrated(odometries))
+
+
+@given(steps())
+def test_motion_cut_everywhere_and_joined_is_the_whole(odometries):
+    motion = Increment()
+    for step in odometries:
+        motion = motion.then(integrated([step]))
+    assert numbers(motion) == close(integrated(odometries))
+
+
+@given(steps(max_size=8), steps(max_size=8), steps(max_size=8))
+def test_joining_is_associative(one, two, three):
+    a, b, c = map(integrated, (one, two, three))
+    assert numbers(a.then(b).then(c)) == close(a.then(b.then(c)))
+
+
+@given(steps())
+def test_no_motion_before_or_after_changes_nothing(odometries):
+    motion = integrated(odometries)
+    assert Increment().then(motion) == motion
+    assert motion.then(Increment(time_ns=motion.time_ns)) == motion
+
+
+@given(steps(max_size=8), steps(max_size=8))
+def test_pose_moved_by_joined_motion_is_the_pose_moved_twice(one, two):
+    a, b = integrated(one), integrated(two)
+    start = Pose(1.0, 2.0, 0.7), Covariance(0.1, 0.02, 0.01, 0.2, -0.01, 0.05)
+    once, twice = compose(*start, a.then(b)), compose(*compose(*start, a), b)
+    assert once[0][:2] == pytest.approx(twice[0][:2], abs=1e-10)
+    assert math.remainder(once[0].heading - twice[0].heading, math.tau) == pytest.approx(0.0, abs=1e-10)
+    assert once[1] == pytest.approx(twice[1], rel=1e-9, abs=1e-10)
+
+
+ERRORS = st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-0.02, 0.02))
+
+
+@given(steps(max_size=10), st.floats(-3.0, 3.0), ERRORS)
+def test_derivatives_of_a_move_are_those_of_finite_differences(odometries, heading, errors):
+    """By the distance error, the turn error and the turn bias, and by the heading, of which no turn depends."""
+    motion, step = integrated(odometries), 1e-6
+    moved = move(heading, motion, *errors)
+    rows = (
+        (-moved.dy, *moved.x_by_errors),
+        (moved.dx, *moved.y_by_errors),
+        (0.0, *moved.turn_by_errors),
+    )
+    analytic = np.array(rows)
+    numeric = np.empty((3, 4))
+    for column in range(4):
+        ahead, behind = (np.array([heading, *errors]) + sign * step * np.eye(4)[column] for sign in (1.0, -1.0))
+        numeric[:, column] = np.subtract(
+            move(*ahead[:1], motion, *ahead[1:])[:3], move(*behind[:1], motion, *behind[1:])[:3]
+        )
+    assert np.allclose(analytic, numeric / (2.0 * step), rtol=1e-6, atol=1e-6)
+
+
+@given(steps(max_size=10), st.floats(-3.0, 3.0), ERRORS)
+def test_noise_of_a_move_is_that_of_the_motion_turned_into_the_map(odometries, heading, errors):
+    motion = integrated(odometries)
+    c, s = math.cos(heading), math.sin(heading)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    expected = rotation @ np.array(motion.covariance.matrix) @ rotation.T
+    assert np.allclose(move(heading, motion, *errors).noise.matrix, expected, rtol=1e-9, atol=1e-12)
+
+
+@given(steps(max_size=10), st.floats(-3.0, 3.0))
+def test_move_without_errors_is_the_pose_composed(odometries, heading):
+    motion = integrated(odometries)
+    moved, (pose, noise) = move(heading, motion), compose(Pose(0.0, 0.0, heading), Covariance(*[0.0] * 6), motion)
+    assert (moved.dx, moved.dy) == pytest.approx(pose[:2], abs=1e-12)
+    assert math.remainder(heading + moved.turn - pose.heading, math.tau) == pytest.approx(0.0, abs=1e-12)
+    assert moved.noise == pytest.approx(noise, abs=1e-12)
+
+
+@given(steps(max_size=10), ERRORS, st.floats(0.0, 1.0))
+def test_move_with_errors_is_the_motion_measured_without_them_to_first_order(odometries, errors, share):
+    """The increments as true wheels would give them, integrated: what is left out is of second order in the turn."""
+    distance_error, turn_error, turn_bias = (share * error for error in errors)
+    corrected = [
+        replace(
+            o,
+            distance_m=o.distance_m * (1.0 + distance_error),
+            turn_rad=o.turn_rad * (1.0 + turn_error) + turn_bias * (o.time_ns - o.from_ns) / SECOND,
+        )
+        for o in odometries
+    ]
+    motion, truth = integrated(odometries), integrated(corrected)
+    moved = move(0.0, motion, distance_error, turn_error, turn_bias)
+    turned = sum(abs(o.turn_rad) for o in odometries) * abs(turn_error) + motion.duration_s * abs(turn_bias)
+    assert moved.turn == pytest.approx(truth.heading, abs=1e-9)
+    assert math.hypot(moved.dx - truth.x, moved.dy - truth.y) <= 0.6 * turned**2 * truth.path_m + 1e-9
+
+
+def test_errors_of_many_robots_correct_a_motion_as_those_of_each():
+    motion = integrated([odometry(k, 0.3, 0.1) for k in range(1, 30)])
+    errors = np.random.default_rng(1).normal(0.0, 0.02, (3, 5))
+    together = np.array(motion.corrected(*errors))
+    assert np.array_equal(together.T, [motion.corrected(*one) for one in errors.T])
+
+
+# --- where a stretch is closed ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "turn_rad", "period_ns", "closing"),
+    [
+        pytest.param(1.0, 0.0, SECOND, 20, id="path: 20 m straight on"),
+        pytest.param(-1.0, 0.0, SECOND, 20, id="path: 20 m backwards"),
+        pytest.param(0.0, 0.5, SECOND, 13, id="turn: 6.5 rad to the left"),
+        pytest.param(0.0, -0.5, SECOND, 13, id="turn: 6.5 rad to the right"),
+        pytest.param(0.0, 0.0, SECOND, 30, id="time: 30 s at rest"),
+        pytest.param(0.5, 0.5, SECOND, 13, id="whichever is first"),
+        pytest.param(0.125, 0.0, SECOND // 10, 160, id="at 10 Hz as well"),
+    ],
+)
+def test_stretch_is_closed_by_path_turn_and_time(distance_m, turn_rad, period_ns, closing):
+    measurements = [odometry(k, distance_m, turn_rad, period_ns) for k in range(1, 2 * closing + 2)]
+    closed = [(m.time_ns, len(m.epochs)) for m in moments_of(measurements) if m.epochs]
+    assert closed == [(closing * period_ns, 1), (2 * closing * period_ns, 1)]
+
+
+@pytest.mark.parametrize(
+    "turn_rad", [0.0, 0.5 * math.pi, math.pi, 2.0 * math.pi], ids=["straight", "quarter", "half", "circle"]
+)
+@pytest.mark.parametrize(("turn_error", "turn_bias"), [(0.05, 0.0), (-0.05, 0.0), (0.0, 0.01), (0.0, -0.01)])
+def test_first_order_holds_over_the_longest_stretch(turn_rad, turn_error, turn_bias):
+    """As `Longest` promises: within 5 % of the path, with a heading off by 0.3 rad."""
+    n = 300
+    path_m, duration_s = LONGEST.path_m, LONGEST.duration_s
+
+    def driven(turn):
+        period_ns = int(duration_s * SECOND) // n
+        return integrated([odometry(k, path_m / n, turn / n, period_ns) for k in range(1, n + 1)])
+
+    moved = move(0.0, driven(turn_rad), 0.0, turn_error, turn_bias)
+    truth = driven(turn_rad * (1.0 + turn_error) + turn_bias * duration_s)
+    assert abs(truth.heading - turn_rad) < 0.32
+    assert math.hypot(moved.dx - truth.x, moved.dy - truth.y) < 0.05 * path_m
+
+
+def test_path_counts_both_ways_and_turns_there_and_back_do_not():
+    forth_and_back = [odometry(k, 0.5 * (-1) ** k, 0.0) for k in range(1, 41)]
+    assert [m.time_ns for m in moments_of(forth_and_back) if m.epochs] == [4 * SECOND]
+    left_and_right = [odometry(k, 0.0, 2.0 * (-1) ** k) for k in range(1, 200)]
+    assert epochs_of(moments_of(left_and_right)) == []
+
+
+def test_closed_stretch_ends_with_its_last_message_and_the_next_begins_there():
+    first, second = epochs_of(moments_of([odometry(k, 1.0, 0.0, SECOND) for k in range(1, 41)]))
+    assert (first.time_ns, first.scan, first.motion.time_ns) == (20 * SECOND, None, 20 * SECOND)
+    assert second.motion == first.motion._replace(time_ns=40 * SECOND)
+
+
+def test_scan_begins_a_new_stretch():
+    """10 m, a scan, 15 m: neither is long."""
+    measurements = [odometry(k, 1.0, 0.0, SECOND) for k in range(1, 26)]
+    (epoch,) = epochs_of(moments_of([*measurements[:10], ranges(10 * SECOND), *measurements[10:]]))
+    assert epoch.scan == ranges(10 * SECOND)
+    assert epoch.motion.path_m == pytest.approx(10.0)
+
+
+def test_gap_in_all_sensors_is_closed_before_the_scan_that_ends_it():
+    closed, seen = epochs_of(moments_of([odometry(1, 0.1, 0.0), ranges(60 * SECOND)]))
+    assert (closed.scan, closed.time_ns) == (None, 60 * SECOND)
+    assert closed.motion.unmeasured_s == pytest.approx(60.0 - 0.1 - 0.5)
+    assert seen.motion == Increment(time_ns=60 * SECOND)
+
+
+@given(late_streams())
+def test_same_measurements_in_any_order_of_arrival_make_the_same_epochs_to_the_bit(stream):
+    in_order, arrived = stream
+    expected = epochs_of(moments_of(in_order, longest=SHORT))
+    assert repr(epochs_of(moments_of(arrived, longest=SHORT))) == repr(expected)
+
+
+@given(streams(), st.floats(0.0, 5.0))
+def test_epochs_do_not_depend_on_the_horizon(stream, horizon_s):
+    expected = epochs_of(moments_of(stream, longest=SHORT))
+    assert repr(epochs_of(moments_of(stream, longest=SHORT, horizon_s=horizon_s))) == repr(expected)
+
+
+@given(streams())
+def test_closing_loses_and_adds_no_motion(stream):
+    """Stretches closed early, joined up to each scan, are the motion that was never closed."""
+    never = epochs_of(moments_of(stream, longest=NEVER))
+    early, stretch = [], []
+    for epoch in epochs_of(moments_of(stream, longest=SHORT)):
+        stretch.append(epoch)
+        if epoch.scan is not None:
+            early.append((joined(stretch), epoch.scan))
+            stretch = []
+    assert [scan for _, scan in early] == [epoch.scan for epoch in never]
+    for (motion, _), epoch in zip(early, never, strict=True):
+        assert numbers(motion) == close(epoch.motion)
+
+
+@given(streams())
+def test_no_stretch_is_longer_than_allowed_by_more_than_its_last_message(stream):
+    longest_message_s = max((m.time_ns - m.from_ns) / SECOND for m in stream if isinstance(m, Odometry))
+    epochs = epochs_of(moments_of(stream, longest=SHORT))
+    for epoch in epochs:
+        assert epoch.motion.duration_s <= SHORT.duration_s + longest_message_s + 1e-9
+        assert epoch.time_ns == epoch.motion.time_ns
+        assert epoch.scan is not None or SHORT.reached(epoch.motion)
+    assert all(one.time_ns <= other.time_ns for one, other in pairwise(epochs))
+
+
+# --- the front end ---------------------------------------------------------------------------------------------------
+
+
+def advanced(front_end, *measurements):
+    """State, epochs and Fates after all measurements."""
+    state, epochs, fates = front_end.start(0), (), ()
+    for measurement in measurements:
+        state, closed, more = front_end.advance(state, measurement)
+        epochs, fates = epochs + closed, fates + more
+    return state, epochs, fates
+
+
+def test_motion_is_held_up_to_a_scan_and_counted_once():
+    scans = [ranges(1250 * MILLISECOND, 1), ranges(2 * SECOND, 2)]
+    driven = [Odometry(SECOND, "w", 0, 0, 1.0, 0.2), Odometry(2 * SECOND, "w", 1, SECOND, 0.8, -0.1)]
+    _, epochs, fates = advanced(FrontEnd(WORLD), driven[0], scans[0], driven[1], scans[1])
+    assert fates == ()
+    assert [epoch.scan for epoch in epochs] == scans
+    assert [epoch.time_ns for epoch in epochs] == [1250 * MILLISECOND, 2 * SECOND]
+    assert [epoch.motion.path_m for epoch in epochs] == pytest.approx([1.25, 0.55])
+    assert [epoch.motion.heading for epoch in epochs] == pytest.approx([0.25, -0.15])
+    assert joined(epochs).duration_s == 2.0
+
+
+def test_wheel_ticks_are_motion_to_every_estimator_alike():
+    """Two ticks a wheel of 1.02 cm: 2.04 cm in the second after the first message."""
+    front_end = FrontEnd(replace(WORLD, robot=replace(WORLD.robot, drive="differential")))
+    ticks = [WheelTicks(SECOND, "e", 0, (5, 5)), WheelTicks(2 * SECOND, "e", 1, (7, 7))]
+    state, epochs, fates = advanced(front_end, *ticks)
+    assert (epochs, fates) == ((), ())
+    assert state.motion.x == pytest.approx(0.0204)
+    assert state.motion.time_ns == 2 * SECOND
+
+
+def test_ticks_of_more_wheels_than_the_robot_has_are_refused():
+    with pytest.raises(MeasurementError, match="3 wheels"):
+        advanced(FrontEnd(WORLD), WheelTicks(SECOND, "e", 0, (1, 2, 3)))
+
+
+def test_gyro_that_is_not_the_source_of_turns_gets_its_fate_from_the_host_and_changes_nothing():
+    front_end, gyro = FrontEnd(WORLD), Gyro(2 * SECOND, "gyro", 7, 0.3)
+    before, _, _ = advanced(front_end, odometry(1))
+    after, epochs, fates = front_end.advance(before, gyro)
+    assert (after, epochs) == (before, ())
+    assert [(f.time_ns, f.sensor, f.seq, f.anchor) for f in fates] == [(2 * SECOND, "gyro", 7, "")]
+    assert [(f.decision, f.reason, f.weight) for f in fates] == [(Decision.UNUSABLE, Reason.KIND_NOT_CONSUMED, 0.0)]
+
+
+def test_gyro_that_is_the_source_of_turns_has_no_fate_and_turns_the_motion():
+    gyro = [Gyro(k * SECOND // 10, "gyro", k, 0.5) for k in range(11)]
+    state, epochs, fates = advanced(FrontEnd(GYRO_WORLD), *gyro, Odometry(SECOND, "w", 0, 0, 0.2, 9.9))
+    assert (epochs, fates) == ((), ())
+    assert state.motion.heading == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("world", [WORLD, GYRO_WORLD], ids=["wheels turn", "gyro turns"])
+def test_gyro_that_is_no_number_is_unusable_wherever_turns_come_from(world):
+    _, _, fates = advanced(FrontEnd(world), Gyro(SECOND, "gyro", 0, math.nan))
+    assert [(f.decision, f.reason) for f in fates] == [(Decision.UNUSABLE, Reason.NOT_FINITE)]
+
+
+def test_scan_without_a_usable_reading_closes_nothing_and_motion_goes_on():
+    nowhere = Ranges(SECOND, "uwb", 0, (RangeReading("z", 1.0), RangeReading("a", math.nan)))
+    half = Ranges(2 * SECOND, "uwb", 1, (RangeReading("z", 1.0), RangeReading("b", 2.0), RangeReading("a", 3.0)))
+    _, epochs, fates = advanced(FrontEnd(WORLD), odometry(1), nowhere, odometry(2), half)
+    (epoch,) = epochs
+    assert [reading.anchor for reading in epoch.scan.readings] == ["a", "b"]
+    assert epoch.motion.path_m > 0.1
+    assert [fate.reason for fate in fates] == [Reason.UNKNOWN_ANCHOR, Reason.NOT_FINITE, Reason.UNKNOWN_ANCHOR]
+
+
+def test_motion_held_for_the_asking_closes_nothing_and_is_that_of_a_scan_then():
+    front_end = FrontEnd(WORLD, SHORT)
+    state, _, _ = advanced(front_end, *(odometry(k) for k in range(1, 6)))
+    assert front_end.held(state, 3 * SECOND).duration_s == pytest.approx(3.0)
+    held = front_end.held(state, 600 * MILLISECOND)
+    (epoch,) = front_end.advance(state, ranges(600 * MILLISECOND))[1]
+    assert held == epoch.motion
+    assert front_end.held(state, state.motion.time_ns) == state.motion
+    assert front_end.held(state, 0) == state.motion
