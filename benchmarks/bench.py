@@ -160,7 +160,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def remarks(scores: Sequence[Score]) -> list[str]:
-    """What the tables cannot say: logs without truth, warnings of logs, why an estimator crashed."""
+    """What the tables cannot show: logs without truth, warnings of logs, why an estimator was lost."""
     from benchmarks.table import partly_headed
 
     told: list[str] = []
@@ -173,7 +173,7 @@ def remarks(scores: Sequence[Score]) -> list[str]:
         if score.errors is None:
             told.append(f"{score.run} holds no ground truth: no errors are scored, only NIS, availability and time")
         if score.error is not None:
-            told.append(f"{score.run}: {score.estimator} crashed: {score.error}")
+            told.append(f"{score.run}: {score.estimator} {score.status}: {score.error}")
     return list(dict.fromkeys(told))
 
 

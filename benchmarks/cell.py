@@ -19,15 +19,17 @@ import fusion
 from benchmarks.lane import Lane, run_lane
 from benchmarks.metrics.innovations import innovation_metrics, nis_metrics
 from benchmarks.metrics.instants import availability, evaluation_instants, match
-from benchmarks.metrics.score import Errors, errors, for_json, metrics, quantile
+from benchmarks.metrics.score import Errors, errors, for_json, metrics, metrics_of_lost, unanswered
 from benchmarks.metrics.track import Track
 from logs.reader import read_run
 from logs.run import Run
 
 LEAST_AVAILABILITY = 0.5
-"""An estimator with fewer valid answers than this counts as diverged."""
+"""An estimator with valid answers at no more than this share of instants counts as diverged: its median is infinite."""
 STATUSES = ("ok", "unscored", "diverged", "crashed")
 """What can become of a cell, best first; ``unscored``: the log holds no ground truth."""
+ALIVE = ("ok", "unscored")
+"""Statuses of a cell that was not lost."""
 
 
 class Cell(NamedTuple):
@@ -41,7 +43,9 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class Score:
-    """The result of one cell: see `record` for its meaning. ``errors`` is None without truth."""
+    """The result of one cell: see `record` for its meaning. ``error``: why it was lost. ``errors`` is None without
+    truth.
+    """
 
     run: str
     estimator: str
@@ -52,8 +56,13 @@ class Score:
 
     @cached_property
     def metrics(self) -> dict[str, float]:
-        """Metrics by id (`benchmarks.metrics.score`); empty without truth, and what needs none is among the facts."""
-        return {} if self.errors is None else metrics(self.errors)
+        """Metrics by id (`benchmarks.metrics.score`), of one that was lost `metrics_of_lost`; empty without truth, and
+        what needs none is among the facts.
+        """
+        if self.errors is None:
+            return {}
+        scores = metrics(self.errors)
+        return scores if self.status in ALIVE else metrics_of_lost(scores, metrics(unanswered(self.errors.instants)))
 
     def record(self) -> dict[str, object]:
         """Everything as one flat table for strict JSON: metrics beside facts, in SI units.
@@ -84,10 +93,10 @@ def score_cell(cell: Cell) -> Score:
 def score_lane(cell: Cell, run: Run, lane: Lane) -> Score:
     """The score of a lane that was already run."""
     measured = _errors(run, lane)
-    status = _status(lane, measured)
+    ended = _outcome(lane, measured)
     answered = {} if measured is not None else for_json({"availability": availability(lane.track)})
     facts = {**_facts(cell, run), **answered, **_cost(run, lane)}
-    return Score(run.name, cell.estimator, status, lane.error, measured, facts)
+    return Score(run.name, cell.estimator, *ended, measured, facts)
 
 
 def crashed(cell: Cell, error: str) -> Score:
@@ -107,23 +116,28 @@ def _errors(run: Run, lane: Lane) -> Errors | None:
     return errors(instants, match(instants, lane.track))
 
 
-def _status(lane: Lane, measured: Errors | None) -> str:
+class Outcome(NamedTuple):
+    """How a cell ended: one of `STATUSES`, and why it was lost."""
+
+    status: str
+    error: str | None = None
+
+
+def _outcome(lane: Lane, measured: Errors | None) -> Outcome:
     if lane.error is not None:
-        return "crashed"
-    if measured is None:
-        return status_of(lane.track, math.nan, math.nan)
-    available = float(np.isfinite(measured.position).mean())
-    return status_of(lane.track, available, quantile(measured.position, 0.5))
+        return Outcome("crashed", lane.error)
+    return outcome_of(lane.track, math.nan if measured is None else float(np.isfinite(measured.position).mean()))
 
 
-def status_of(track: Track, availability: float, median_m: float) -> str:
-    """How a lane that was not lost ended, from its availability and its median position error; NaN without truth."""
-    if not track.is_sound:
-        return "diverged"
+def outcome_of(track: Track, availability: float) -> Outcome:
+    """How a lane that did not crash ended, from the share of instants with a valid answer; NaN without truth."""
+    if track.flaw:
+        return Outcome("diverged", track.flaw)
     if math.isnan(availability):
-        return "unscored"
-    # Fewer than half of the answers valid is also what makes the median infinite.
-    return "diverged" if availability < LEAST_AVAILABILITY or not math.isfinite(median_m) else "ok"
+        return Outcome("unscored")
+    if availability <= LEAST_AVAILABILITY:
+        return Outcome("diverged", f"only {100.0 * availability:.1f} % of the instants have a valid answer")
+    return Outcome("ok")
 
 
 def _facts(cell: Cell, run: Run) -> dict[str, object]:
@@ -140,14 +154,17 @@ def _facts(cell: Cell, run: Run) -> dict[str, object]:
 
 
 def _cost(run: Run, lane: Lane) -> dict[str, object]:
-    """What needs no truth: digest, processor time, and of the last word on each measurement fates and innovations."""
+    """What needs no truth: digest, processor time, and of the last word on each measurement fates and, of an estimator
+    that did not diverge, innovations.
+    """
     if lane.error is not None:
         return {}
+    sound = not lane.track.flaw
     return {
         "digest": lane.digest,
         "cpu_s": lane.cpu_s,
         "cpu_per_measurement_s": lane.cpu_s / len(run.measurements) if run.measurements else None,
         "fates": lane.fates.counts,
-        "nis_mean": lane.fates.nis_mean,
-        **for_json({**innovation_metrics(lane.fates), **nis_metrics(lane.fates)}),
+        "nis_mean": lane.fates.nis_mean if sound else None,
+        **(for_json({**innovation_metrics(lane.fates), **nis_metrics(lane.fates)}) if sound else {}),
     }

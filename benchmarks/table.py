@@ -58,12 +58,14 @@ class Unit(NamedTuple):
 def unit_of(metric: str) -> Unit:
     """Centimetres for lengths, degrees for headings; other metrics as they are.
 
-    >>> unit_of("pos_p75").number(0.123), unit_of("anees").number(1.234)
-    ('12.3', '1.23')
+    >>> unit_of("pos_p75").number(0.123), unit_of("anees").number(1.234), unit_of("head_n").name
+    ('12.3', '1.23', '')
     """
     if metric.startswith(LENGTHS) and metric != "pos_auc":
         return Unit(100.0, "cm")
-    return Unit(math.degrees(1.0), "°") if metric.startswith("head_") else Unit(1.0, "")
+    if metric.startswith("head_") and metric != "head_n":
+        return Unit(math.degrees(1.0), "°")
+    return Unit(1.0, "")
 
 
 def partly_headed(metrics: Mapping[str, float]) -> str:

@@ -102,7 +102,9 @@ def match(instants: Instants, track: Track, *, max_age_s: float = MAX_AGE_S) -> 
     a clock that is ahead; of two with one stamp, the later received.
 
     Valid when the estimator says so, its position is finite and ``instant - stamp <= max_age_s`` in whole nanoseconds.
+    None is valid of a track with a flaw (`Track.scorable`).
     """
+    track = track.scorable
     chosen, heard = _newest(instants, track.time_ns, track.received_ns)
     since_fix_s = _since_fix_s(instants, track.received_ns, track.fix_ns)
     return _answers(instants, track.at(chosen), heard, since_fix_s, max_age_s)

@@ -33,9 +33,9 @@ def meet(truth: TruthTrack, track: Track, *, gap_s: float = GAP_S) -> Met:
     """Interpolate ``truth`` at the valid stamps of ``track`` that it covers, not across gaps longer than ``gap_s``.
 
     Of several answers with one stamp the last counts. Each stands for half of the time to its neighbours on either
-    side; to one further away than ``gap_s``, for half of ``gap_s``.
+    side; to one further away than ``gap_s``, for half of ``gap_s``. A track with a flaw has none (`Track.scorable`).
     """
-    known = known_truth(truth)
+    known, track = known_truth(truth), track.scorable
     rows = _chosen(track, known)
     instants, kept = interpolate_truth(known, track.time_ns[rows], gap_s=gap_s)
     kept &= np.count_nonzero(kept) > 1

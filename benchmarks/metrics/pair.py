@@ -74,6 +74,8 @@ def score_pair(
         if given not in known:
             raise ParameterError(f"{given!r} does not exist; {did_you_mean(given, known)}")
     (true, warnings), said = read_truth(truth), read_track(estimate)
+    if said.flaw:
+        raise LogError(f"{estimate}: {said.flaw}")
     weight, availability = None, {}
     if mode == "interp":
         instants, answers, weight, share = meet(true, said, gap_s=gap_s)

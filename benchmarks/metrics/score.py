@@ -11,12 +11,15 @@ import math
 from collections.abc import Mapping
 
 from benchmarks.metrics.consistency import CHI_SQUARE_95, Claimed, consistency_metrics, distribution_metrics
+from benchmarks.metrics.course import Instants
 from benchmarks.metrics.deviation import Errors, errors, pool
 from benchmarks.metrics.drift import drift_metrics
 from benchmarks.metrics.dynamics import dynamic_metrics
+from benchmarks.metrics.instants import match
 from benchmarks.metrics.intervals import interval_metrics, quantile_intervals
 from benchmarks.metrics.position import axis_metrics, heading_metrics, position_metrics, track_metrics
 from benchmarks.metrics.quantiles import Ordered, quantile
+from benchmarks.metrics.track import Track
 from benchmarks.metrics.trajectory import trajectory_metrics
 
 METRICS_VERSION = 10
@@ -30,8 +33,10 @@ __all__ = [
     "errors",
     "for_json",
     "metrics",
+    "metrics_of_lost",
     "pool",
     "quantile",
+    "unanswered",
 ]
 
 
@@ -47,6 +52,18 @@ def metrics(measured: Errors) -> dict[str, float]:
         **dynamic_metrics(measured),
         **interval_metrics(measured, ordered, claimed),
     }
+
+
+def metrics_of_lost(scores: Mapping[str, float], silent: Mapping[str, float]) -> dict[str, float]:
+    """Of the ``scores`` of an estimator that was lost those that count the instants without an answer too. Means over
+    the answers it did give are NaN: they are what is NaN in ``silent``, the metrics of one that never answers.
+    """
+    return {name: value if not math.isnan(silent[name]) else math.nan for name, value in scores.items()}
+
+
+def unanswered(instants: Instants) -> Errors:
+    """The errors of an estimator that never answers."""
+    return errors(instants, match(instants, Track.of_estimates(())))
 
 
 def absolute_metrics(measured: Errors) -> dict[str, float]:

@@ -5,6 +5,7 @@ Updates are objects, one per measurement; every metric wants arrays. They are tu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from fusion import Decision, Estimate, Ranges, Reason, Update, WifiScan
 from fusion.timeline import Key, order
+from fusion.values import NANOSECONDS
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -23,6 +25,9 @@ Flags = NDArray[np.bool_]
 
 BEFORE_ALL_NS = np.iinfo(np.int64).min
 NO_CLAIM = (np.nan,) * 6
+UNSOUND_CLAIM = (np.nan,) * 5 + (np.inf,)
+POSITION_CLAIM, HEADING_CLAIM = [0, 1, 3], [2, 4, 5]
+"""Of the numbers of a `fusion.Covariance`."""
 BELIEVED = (Decision.USED, Decision.DOWNWEIGHTED)
 
 
@@ -38,7 +43,8 @@ class Track(NamedTuple):
 
     ``received_ns``: when each was there, the newest true stamp among the messages received by then, so it never
     decreases; a message whose own clock was refused says nothing about the time. ``time_ns``: the time it is about.
-    ``pose`` (n, 3) [m, m, rad]. ``covariance`` (n, 6), in the order of `fusion.Covariance`, NaN where none was claimed.
+    ``pose`` (n, 3) [m, m, rad]. ``covariance`` (n, 6), in the order of `fusion.Covariance`, NaN where none was claimed;
+    of one that was claimed and is all NaN the last number is infinite.
     ``fix_ns``: the true stamp of the radio measurement that was believed just then, or `BEFORE_ALL_NS`.
     """
 
@@ -69,7 +75,7 @@ class Track(NamedTuple):
             np.maximum.accumulate(time_ns),
             time_ns,
             np.array([estimate.pose for estimate in estimates], dtype=np.float64).reshape(-1, 3),
-            np.array([estimate.covariance or NO_CLAIM for estimate in estimates], dtype=np.float64).reshape(-1, 6),
+            np.array([_claim(estimate) for estimate in estimates], dtype=np.float64).reshape(-1, 6),
             np.array([estimate.valid for estimate in estimates], dtype=bool),
             np.array([estimate.heading_known for estimate in estimates], dtype=bool),
             np.full(len(time_ns), BEFORE_ALL_NS),
@@ -112,11 +118,44 @@ class Track(NamedTuple):
         return np.where(self.heading_known & np.isfinite(self.pose[:, 2]), self.pose[:, 2], np.nan)
 
     @property
-    def is_sound(self) -> bool:
-        """Whether every number is one; what is not claimed, a pose not valid or a heading not known, may be any."""
+    def flaw(self) -> str:
+        """Why nothing of it can be scored: its first answer that is no number; "" where all are. What is not claimed, a
+        pose not valid or a heading not known, may be anything.
+        """
+        unsound = np.flatnonzero(self.valid & ~(self._is_pose & self._is_claim))
+        if len(unsound) == 0:
+            return ""
+        row = unsound[0]
+        x, y, heading = self.pose[row]
+        answer = "a covariance of NaN" if self._is_pose[row] else f"x {x:g} m, y {y:g} m, heading {heading:g} rad"
+        after_s = (self.time_ns[row] - self.time_ns[0]) / NANOSECONDS
+        return f"it answers {answer}, {after_s:g} s after its first answer, so none of its answers is scored"
+
+    @property
+    def scorable(self) -> Track:
+        """Itself, and of one with a flaw no answer at all: the part before the flaw is no result."""
+        return self.at(np.empty(0, dtype=np.int64)) if self.flaw else self
+
+    @property
+    def _is_pose(self) -> Flags:
         finite = np.isfinite(self.pose)
-        whole = finite[:, 0] & finite[:, 1] & (finite[:, 2] | ~self.heading_known)
-        return bool(np.all(whole | ~self.valid))
+        return np.asarray(finite[:, 0] & finite[:, 1] & (finite[:, 2] | ~self.heading_known))
+
+    @property
+    def _is_claim(self) -> Flags:
+        """Whether what is claimed of the variances is a number, or nothing is claimed."""
+        missing = np.isnan(self.covariance)
+        if not missing.any():
+            return np.ones(len(missing), dtype=bool)
+        spoilt = missing[:, POSITION_CLAIM].any(axis=1) | (missing[:, HEADING_CLAIM].any(axis=1) & self.heading_known)
+        return np.asarray(missing.all(axis=1) | ~spoilt)
+
+
+def _claim(estimate: Estimate) -> tuple[float, ...]:
+    claimed = estimate.covariance
+    if claimed is None:
+        return NO_CLAIM
+    return UNSOUND_CLAIM if all(map(math.isnan, claimed)) else claimed
 
 
 def _is_bad_clock(update: Update) -> bool:

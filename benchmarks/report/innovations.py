@@ -14,8 +14,8 @@ from benchmarks.sheet import Sheet
 
 
 def nis_of_cells(material: Material) -> dict[tuple[str, str], dict[str, Banded]]:
-    """Of the cells that are shown, by run and contestant."""
-    return {key: mean_nis(series.fates) for key, series in material.series.items()}
+    """Of the cells that are shown and were not lost, by run and contestant."""
+    return {key: mean_nis(series.fates) for key, series in material.series.items() if series.is_scored}
 
 
 def innovations(material: Material) -> Sheet:

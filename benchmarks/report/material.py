@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.cell import ALIVE
 from benchmarks.metrics.bound import Places, Radio, fix_error
 from benchmarks.metrics.course import Instants
 from benchmarks.metrics.deviation import Errors, errors
@@ -40,6 +41,11 @@ class Series(NamedTuple):
     instants: Instants
     answers: Answers
     fates: FateColumns
+
+    @property
+    def is_scored(self) -> bool:
+        """Whether the cell was not lost."""
+        return self.result.status in ALIVE
 
     @property
     def time_s(self) -> Floats:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.cell import LEAST_AVAILABILITY
+from benchmarks.cell import ALIVE
 from benchmarks.metrics.bound import eff_crlb
 from benchmarks.metrics.credibility import credibility_metrics
 from benchmarks.metrics.posterior import eff_pcrlb, posterior_bound
@@ -17,7 +17,7 @@ from benchmarks.report.cells import link, link_all, nearest, nearest_to
 from benchmarks.report.material import Material
 from benchmarks.report.worst import command, worst_moments
 from benchmarks.runner.definition import CLEAN
-from benchmarks.runner.results import ALIVE, Result, by_contestant, by_run, median_metrics, score_matrix
+from benchmarks.runner.results import Result, by_contestant, by_run, median_metrics, score_matrix
 from benchmarks.sheet import Sheet, as_code
 from benchmarks.statistics.statistics import mean_interval
 from benchmarks.table import COLUMNS, Column, Unit, as_text
@@ -114,7 +114,7 @@ def limits(material: Material) -> Sheet:
         cells = []
         for run_id, bound in bounds.items():
             series = material.series.get((run_id, name))
-            if series is None or not np.array_equal(series.instants.time_ns, bound.time_ns):
+            if series is None or not series.is_scored or not np.array_equal(series.instants.time_ns, bound.time_ns):
                 cells.append("–")
                 continue
             ratio = eff_pcrlb(series.error_m[None], bound.error_m[None])
@@ -129,7 +129,10 @@ def fixes(material: Material) -> Sheet:
     rows = []
     for name in material.contestants:
         series = [material.series.get((run_id, name)) for run_id in material.scored_runs]
-        found = [math.nan if one is None else eff_crlb(one.error_m, material.fix_bound_m(one)) for one in series]
+        found = [
+            math.nan if one is None or not one.is_scored else eff_crlb(one.error_m, material.fix_bound_m(one))
+            for one in series
+        ]
         rows.append((name, *("–" if math.isnan(ratio) else f"{100.0 * ratio:.0f} %" for ratio in found)))
     title = "One perfect fix: its Cramér-Rao bound over the RMSE (only motion or a prior brings more than 100 %)"
     return Sheet(title, ("estimator", *material.scored_runs), tuple(rows))
@@ -171,20 +174,11 @@ def moments(material: Material) -> Sheet:
 def lost(material: Material) -> Sheet:
     """Every cell that did not survive, and why."""
     rows = tuple(
-        (link(material, str(result.cell), result), result.status, _why(result))
+        (link(material, str(result.cell), result), result.status, as_code(result.error or result.status))
         for result in material.results
         if result.status not in ALIVE
     )
     return Sheet("Lost cells", ("cell", "status", "why"), rows, prose=True)
-
-
-def _why(result: Result) -> str:
-    if result.error:
-        return as_code(result.error)
-    available = result.metrics.get("availability", math.nan)
-    if available < LEAST_AVAILABILITY:
-        return f"only {100.0 * available:.0f} % of the instants had a valid answer"
-    return "it answered with numbers that are none, or its median error is infinite"
 
 
 def provenance(material: Material) -> Sheet:

@@ -113,5 +113,5 @@ def markdown(scores: Sequence[Score]) -> str:
         remark = "" if score.status in ("ok", "unscored") else f" ({score.status})"
         cells = [score.estimator + remark, *(as_text(column, values) for column in columns)]
         lines.append("| " + " | ".join(cells) + " |")
-    crashes = [f"\n{score.estimator} crashed: {score.error}" for score in scores if score.error is not None]
-    return "\n".join([*lines, *crashes]) + "\n"
+    lost = [f"\n{score.estimator} {score.status}: {score.error}" for score in scores if score.error is not None]
+    return "\n".join([*lines, *lost]) + "\n"

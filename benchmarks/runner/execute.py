@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from zipfile import BadZipFile
 
-from benchmarks.cell import status_of
+from benchmarks.cell import ALIVE, Outcome, outcome_of
 from benchmarks.faults.faults import apply_faults
 from benchmarks.lane import Lane, run_lane
 from benchmarks.metrics.archive import from_bytes, to_bytes
@@ -18,7 +18,7 @@ from benchmarks.metrics.innovations import innovation_metrics
 from benchmarks.metrics.track import Track
 from benchmarks.review.frame import Frame
 from benchmarks.runner.definition import CLEAN
-from benchmarks.runner.judge import judge
+from benchmarks.runner.judge import judge, metrics_if_lost
 from benchmarks.runner.plan import Cell, has_estimate, read_faults
 from benchmarks.runner.reference import reference_of
 from benchmarks.runner.source import open_run
@@ -135,18 +135,19 @@ def score(cell: Cell, store: Store) -> str:
         return str(store.read_json("scores", cell.score_key, "result.json")["status"])
     made = store.read_json("estimates", cell.estimate_key, "result.json")
     track, fates = stored_track(cell, store)
-    judged = judge(cell, track, reference_of(cell, store))
-    measured = {} if judged is None else judged.metrics
-    said = (measured.get("availability", math.nan), measured.get("pos_p50", math.nan))
-    status = str(made["ended"]) if made["error"] else status_of(track, *said)
-    measured |= innovation_metrics(fates)
-    found = {
-        "status": status,
-        "metrics": {key: _finite(value) for key, value in measured.items()},
-        "worst_at_s": None if judged is None else judged.worst_at_s(made.get("start_ns")),
-    }
-    store.write("scores", cell.score_key, {"result.json": to_json(found)})
-    return status
+    reference = reference_of(cell, store)
+    judged = judge(cell, track, reference)
+    available = math.nan if judged is None else judged.metrics["availability"]
+    ended = Outcome(str(made["ended"]), made["error"]) if made["error"] else outcome_of(track, available)
+    measured, worst_at_s = {} if judged is None else judged.metrics, None
+    if judged is not None and ended.status in ALIVE:
+        worst_at_s = judged.worst_at_s(made.get("start_ns"))
+    elif judged is not None:
+        measured = metrics_if_lost(cell, reference, judged)
+    numbers = {**measured, **({} if track.flaw else innovation_metrics(fates))}
+    found = {**ended._asdict(), "metrics": {key: _finite(value) for key, value in numbers.items()}}
+    store.write("scores", cell.score_key, {"result.json": to_json({**found, "worst_at_s": worst_at_s})})
+    return ended.status
 
 
 def _finite(value: float) -> float | str | None:

@@ -10,11 +10,12 @@ from io import StringIO
 from pathlib import Path
 from xml.etree import ElementTree
 
+from benchmarks.cell import ALIVE
 from benchmarks.output import write, write_json
 from benchmarks.runner.compare_verb import stored_results
 from benchmarks.runner.definition import Suite
 from benchmarks.runner.plan_verb import suite_options
-from benchmarks.runner.results import ALIVE, Result, flat, leaderboard, record
+from benchmarks.runner.results import Result, flat, leaderboard, record
 from benchmarks.sheet import Sheet, as_markdown
 from fusion import ParameterError
 

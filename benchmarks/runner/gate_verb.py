@@ -15,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.arguments import at_least_one
+from benchmarks.cell import ALIVE
 from benchmarks.metrics.track import Floats
 from benchmarks.runner.baseline import Baseline, Row, counterparts, read_baseline, scores
 from benchmarks.runner.definition import CLEAN, Gate
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.plan_verb import opened, suite_options
 from benchmarks.runner.results import (
-    ALIVE,
     MORE_IS_BETTER,
     Result,
     by_contestant,

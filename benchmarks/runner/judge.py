@@ -10,7 +10,7 @@ from benchmarks.faults.faults import outages
 from benchmarks.metrics.dynamics import fault_metrics
 from benchmarks.metrics.instants import match
 from benchmarks.metrics.interpolation import meet
-from benchmarks.metrics.score import Errors, errors, metrics
+from benchmarks.metrics.score import Errors, errors, metrics, metrics_of_lost, unanswered
 from benchmarks.metrics.track import Track
 from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.plan import Cell, read_faults
@@ -44,6 +44,15 @@ def judge(cell: Cell, track: Track, reference: Reference) -> Judged | None:
         return Judged(measured, {**_metrics(cell, reference, measured), "availability": met.availability})
     measured = errors(reference.instants, match(reference.instants, track, max_age_s=rules.max_age_s))
     return Judged(measured, _metrics(cell, reference, measured))
+
+
+def metrics_if_lost(cell: Cell, reference: Reference, judged: Judged) -> dict[str, float]:
+    """What is left of the metrics of a cell that was lost: `metrics_of_lost`, and its availability. At the estimate's
+    own stamps no metric counts an instant without an answer, so there nothing else is left.
+    """
+    silent = _metrics(cell, reference, unanswered(reference.instants))
+    left = silent if cell.evaluation.reading == "interp" else metrics_of_lost(judged.metrics, silent)
+    return {**left, "availability": judged.metrics["availability"]}
 
 
 def _metrics(cell: Cell, reference: Reference, measured: Errors) -> dict[str, float]:

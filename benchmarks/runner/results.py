@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.cell import ALIVE
 from benchmarks.metrics.score import METRICS_VERSION, quantile
 from benchmarks.metrics.track import Floats
 from benchmarks.runner.definition import CLEAN, TEST, Suite
@@ -27,14 +28,12 @@ MORE_IS_BETTER = re.compile(
 )
 NEITHER_IS_BETTER = re.compile(r"anees.*|nll_.*|.*bias.*|cov_.*|path_ratio|eag|.*growth")
 """Their best is 1 or 0, or they may be negative and so have no ratio."""
-ALIVE = ("ok", "unscored")
-"""Statuses of a cell that was not lost."""
 
 
 class Result(NamedTuple):
-    """One cell's score: infinite and NaN metrics are what `benchmarks.metrics.score` says they are. ``worst_at_s``:
-    when its position error was greatest, since the start of the run; None where there is no error. ``warnings``: a
-    sentence for each thing that is wrong with its run.
+    """One cell's score: infinite and NaN metrics are what `benchmarks.metrics.score` says they are. ``error``: why it
+    was lost. ``worst_at_s``: when its position error was greatest, since the start of the run; None where there is no
+    error, or no score. ``warnings``: a sentence for each thing that is wrong with its run.
     """
 
     cell: Cell
@@ -54,7 +53,7 @@ def read_results(cells: Iterable[Cell], store: Store) -> list[Result]:
         if store.has("scores", cell.score_key):
             scored = store.read_json("scores", cell.score_key, "result.json")
             made = store.read_json("estimates", cell.estimate_key, "result.json")
-            told = (scored["status"], made["error"], made["digest"], read_metrics(scored), made, scored["worst_at_s"])
+            told = (scored["status"], scored["error"], made["digest"], read_metrics(scored), made, scored["worst_at_s"])
             found.append(Result(cell, *told, tuple(made.get("warnings", ()))))
     return found
 

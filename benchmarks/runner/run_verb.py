@@ -9,13 +9,14 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from benchmarks.arguments import at_least_one
+from benchmarks.cell import ALIVE
 from benchmarks.progress import Progress, progress_bar
 from benchmarks.runner.definition import CLEAN, Suite
 from benchmarks.runner.execute import Done, execute
 from benchmarks.runner.plan import Cell, cells_of, missing, shard
 from benchmarks.runner.plan_verb import opened, suite_options
 from benchmarks.runner.refusals import refuse_impossible
-from benchmarks.runner.results import ALIVE, Result, leaderboard, read_results, warnings
+from benchmarks.runner.results import Result, leaderboard, read_results, warnings
 from benchmarks.runner.store import Store
 from benchmarks.sheet import print_sheets
 from benchmarks.table import partly_headed
@@ -63,9 +64,17 @@ def _carried_out(
 
 
 def lost(results: Sequence[Result]) -> list[str]:
-    """Why contestants have no answer in some cells, one sentence for each reason they gave."""
-    counted = Counter((one.cell.contestant.id, one.error) for one in results if one.error is not None)
-    return [f"{name} lost {count} of its cells: {error}" for (name, error), count in counted.items()]
+    """Why contestants have no score in some cells: a sentence for each status they ended with, and its first reason."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for one in results:
+        if one.status not in ALIVE:
+            reasons.setdefault((one.cell.contestant.id, one.status), []).append(one.error or one.status)
+    return [f"{name} lost {len(own)} of its cells: {_first(own)}" for (name, _), own in reasons.items()]
+
+
+def _first(reasons: Sequence[str]) -> str:
+    others = len(set(reasons)) - 1
+    return reasons[0] + (f" (and {others} more reasons; `fusion bench report` lists all)" if others else "")
 
 
 def remarks(results: Sequence[Result]) -> list[str]:

@@ -76,6 +76,14 @@ class Diverges(Wheels):
         return super().estimate(state, motion, time_ns)._replace(pose=Pose(math.nan, 0.0, 0.0))
 
 
+class Poisoned(Wheels):
+    """Right for one second, then no number at all."""
+
+    def estimate(self, state, time_ns):
+        answer = super().estimate(state, time_ns)
+        return answer if state.steps <= 10 else answer._replace(pose=Pose(*[math.nan] * 3))
+
+
 @pytest.fixture(autouse=True)
 def _estimators():
     with (
@@ -83,6 +91,7 @@ def _estimators():
         fusion.registered("toy_dies", Dies),
         fusion.registered("toy_quiet", Quiet),
         fusion.registered("toy_diverges", Diverges),
+        fusion.registered("toy_poisoned", Poisoned),
     ):
         yield
 
@@ -141,6 +150,52 @@ def test_half_a_run_before_a_crash_is_no_result(tmp_path):
     assert "half way" in score.error
     assert score.metrics["availability"] == 0.0
     assert score.record()["pos_p50"] is None
+
+
+FLATTERING = (
+    "pos_rmse",
+    "pos_mean",
+    "pos_max",
+    "head_rmse",
+    "anees",
+    "along_rmse",
+    "rpe_t_1s_rmse",
+    "energy",
+    "vel_err",
+)
+
+
+def test_answer_that_is_no_number_leaves_no_score_of_the_seconds_before_it(tmp_path, capsys):
+    scores = bench([write_run(tmp_path / "run.mcap")], estimators=["toy_poisoned", "toy_wheels"], workers=1)
+    poisoned, wheels = (score.record() for score in scores)
+    assert all(wheels[name] is not None for name in FLATTERING)
+    assert [poisoned[name] for name in FLATTERING] == [None] * len(FLATTERING)
+    assert (poisoned["status"], poisoned["availability"], poisoned["pos_p50"]) == ("diverged", 0.0, None)
+    assert poisoned["nis_mean"] is None
+    cause = "it answers x nan m, y nan m, heading nan rad, 1 s after its first answer, so none of its answers is scored"
+    assert poisoned["error"] == cause
+    assert f"run: toy_poisoned diverged: {cause}" in remarks(scores)
+    print_tables(scores, pooled(scores))
+    (row,) = [line for line in capsys.readouterr().out.splitlines() if line.lstrip().startswith("toy_poisoned")]
+    assert row.split()[:9] == ["toy_poisoned", "(diverged)", "–", "–", "∞", "∞", "∞", "–", "–"]
+    assert "0.0" in row.split()[10], "the availability"
+
+
+def test_answer_that_is_no_number_leaves_no_score_where_there_is_no_truth_either(tmp_path):
+    (score,) = bench([write_run(tmp_path / "run.mcap", truth=False)], estimators=["toy_poisoned"], workers=1)
+    assert (score.status, score.facts["availability"], score.facts["nis_mean"]) == ("diverged", 0.0, None)
+    assert any("toy_poisoned diverged: it answers x nan m" in remark for remark in remarks([score]))
+
+
+def test_estimator_that_falls_silent_keeps_only_what_counts_its_silence(tmp_path):
+    (score,) = bench([write_run(tmp_path / "run.mcap")], estimators=["toy_quiet"], workers=1)
+    record = score.record()
+    assert [record[name] for name in FLATTERING] == [None] * len(FLATTERING)
+    assert record["error"] == "only 37.3 % of the instants have a valid answer"
+    assert (record["n"], record["n_valid"], record["pos_cdf_1m"]) == (51.0, 19.0, 19.0 / 51.0)
+    assert record["availability"] == 19.0 / 51.0
+    assert score.metrics["pos_p75"] == math.inf
+    assert score.errors.position.min() < 1e-9, "a review still draws it"
 
 
 def test_records_are_strict_json_with_flat_metrics(tmp_path):

@@ -122,6 +122,38 @@ def test_answers_not_claimed_or_not_finite_are_not_valid():
     assert math.isnan(match(instants, Track.of([update_at(10, heading_known=False)])).heading[0])
 
 
+def test_track_with_an_answer_that_is_no_number_has_no_answer_at_all():
+    instants = evaluation_instants(truth_at(np.arange(4) * SECOND))
+    sound = [update_at(k * SECOND, 1.0) for k in range(4)]
+    assert match(instants, Track.of(sound)).valid.all()
+    spoilt = Track.of([*sound[:2], update_at(2 * SECOND, math.nan), sound[3]])
+    assert not match(instants, spoilt).valid.any()
+    assert spoilt.flaw.startswith("it answers x nan m, y ")
+    assert ", 2 s after its first answer" in spoilt.flaw
+    unclaimed = Track.of([*sound[:2], update_at(2 * SECOND, math.nan, valid=False), sound[3]])
+    assert match(instants, unclaimed).valid.tolist() == [True, True, False, True]
+
+
+def _claiming(covariance, **claimed):
+    update = update_at(SECOND)
+    return Track.of([update._replace(estimate=update.estimate._replace(covariance=covariance, **claimed))])
+
+
+def test_covariance_that_is_no_number_is_a_flaw_and_one_that_is_not_claimed_is_none():
+    sound, nothing = Covariance.from_std(0.1, 0.1, 0.1), Covariance(*[math.nan] * 6)
+    headless = sound._replace(xh=math.nan, yh=math.nan, hh=math.nan)
+    assert _claiming(nothing).flaw.startswith("it answers a covariance of NaN, 0 s after")
+    assert _claiming(sound._replace(xy=math.nan)).flaw
+    assert _claiming(headless).flaw
+    for covariance, claimed in (
+        (None, {}),
+        (sound, {}),
+        (headless, {"heading_known": False}),
+        (nothing, {"valid": False}),
+    ):
+        assert _claiming(covariance, **claimed).flaw == ""
+
+
 def test_age_is_that_of_the_newest_answer_and_infinite_before_the_first():
     instants = evaluation_instants(truth_at([0, SECOND, 3 * SECOND]))
     answers = match(instants, Track.of([update_at(SECOND // 2), update_at(SECOND, stamp_ns=3 * SECOND // 4)]))

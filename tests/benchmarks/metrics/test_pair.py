@@ -15,7 +15,8 @@ from benchmarks.metrics.pair import MODES, score_pair
 from benchmarks.metrics.score import errors, metrics
 from benchmarks.metrics.tracks import read_track, read_truth
 from benchmarks.metrics.trajectory import Poses, relative_errors
-from fusion import FusionError, LogError, ParameterError
+from fusion import Estimate, FusionError, LogError, Odometry, ParameterError, Pose, Truth, Update, World
+from logs.writer import RunWriter
 
 GOLDEN = {
     "pos_rmse": 0.324411033066140,
@@ -101,6 +102,33 @@ def test_clocks_that_never_meet_are_named(tmp_path, write_tum):
     for mode in MODES:
         with pytest.raises(LogError, match="same clock"):
             score_pair(tmp_path / "truth.tum", tmp_path / "later.tum", mode=mode)
+
+
+def test_recorded_answer_that_is_no_number_leaves_no_score(tmp_path):
+    world = World.from_table({"name": "here", "bounds": {"x_min": 0, "x_max": 1, "y_min": 0, "y_max": 1}})
+    with RunWriter(tmp_path / "run.mcap", world, name="run") as log:
+        for k in range(10):
+            odometry = Odometry(k * 10**8, "wheels", k, max(k - 1, 0) * 10**8, 0.1, 0.0)
+            log.write(odometry)
+            log.write_truth(Truth(k * 10**8, 0.1 * k, 0.0, 0.0))
+            x = 0.1 * k if k < 4 else math.nan
+            log.write_update("ekf", Update(odometry, Estimate(k * 10**8, Pose(x, 0.0, 0.0), None), ()))
+    for mode in MODES:
+        with pytest.raises(LogError, match=r"run\.mcap:ekf: it answers x nan m, .* 0\.4 s after its first answer"):
+            score_pair(tmp_path / "run.mcap", f"{tmp_path / 'run.mcap'}:ekf", mode=mode)
+
+
+def test_command_tells_what_of_the_truth_is_left_out(tmp_path, capsys):
+    head = "time_s,x_m,y_m,heading_rad"
+    (tmp_path / "truth.csv").write_text(f"{head}\n0,0,0,0\n1,,0,0\n2,2,0,\n3,3,0,0\n", encoding="utf-8")
+    (tmp_path / "mine.csv").write_text(f"{head}\n0,0,0,0\n2,2,0,1\n3,3,0,0\n", encoding="utf-8")
+    command("--truth", tmp_path / "truth.csv", "--estimate", tmp_path / "mine.csv", "--json", tmp_path / "out.json")
+    printed = capsys.readouterr()
+    assert "1 of 4 true poses have no position, and are left out" in printed.err
+    assert "instants with a true heading" in printed.out
+    record = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
+    assert (record["n"], record["head_n"], record["head_rmse"]) == (3.0, 2.0, 0.0)
+    assert len(record["warnings"]) == 1
 
 
 def test_unknown_mode_is_refused_before_anything_is_read():

@@ -90,7 +90,7 @@ def test_tum_heading_of_a_quaternion_that_is_none_is_not_known(tmp_path, rotatio
     track = read_track(path)
     np.testing.assert_array_equal(track.heading, [math.nan, 0.0])
     assert track.heading_known.tolist() == [False, True]
-    assert track.is_sound
+    assert track.flaw == ""
     np.testing.assert_array_equal(read_truth(path)[0].heading, [math.nan, 0.0])
 
 

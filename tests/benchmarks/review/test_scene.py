@@ -84,6 +84,14 @@ class Silent(Straight):
         return super().estimate(state, motion, time_ns)._replace(valid=False)
 
 
+class Poisoned(Straight):
+    """No number from the fifth scan on."""
+
+    def estimate(self, state, time_ns):
+        answer = super().estimate(state, time_ns)
+        return answer if state < 5 else answer._replace(pose=answer.pose._replace(x=math.nan))
+
+
 class Broken(Straight):
     def step(self, state, motion, scan):
         raise ZeroDivisionError("on purpose")
@@ -382,6 +390,17 @@ def test_full_disk_is_one_error(tmp_path):
     (tmp_path / "layers" / "toy.rrd").symlink_to("/dev/full")
     with pytest.raises(FusionError, match=r"toy\.rrd: cannot be written \(No space left on device\)"):
         write_scene(tmp_path / "layers", run, lanes, scores)
+
+
+def test_answer_that_is_no_number_is_told_beside_the_table_and_draws_no_error(tmp_path):
+    with fusion.registered("poisoned", Poisoned):
+        lanes, scores = scored(run_of(tmp_path), ["poisoned", "toy"])
+    row, told = markdown(scores).splitlines()[3], markdown(scores).splitlines()[-1]
+    assert row.startswith("| poisoned (diverged) | – | – | ∞ |")
+    assert told.startswith("poisoned diverged: it answers x nan m, y 0.5 m, heading 0 rad, 2 s after its first answer")
+    (scene,) = write_scene(tmp_path / "review.rrd", run_of(tmp_path), lanes, scores)
+    assert "/error/poisoned" not in chunks_of(scene)
+    assert "/map/estimate/poisoned/path" in chunks_of(scene)
 
 
 def test_place_that_cannot_be_written_is_refused(tmp_path):

@@ -1,0 +1,109 @@
+"""Cells that were lost have a reason and no score of the part before, in the leaderboard and in the report."""
+
+import math
+
+import pytest
+
+import fusion
+from benchmarks.report.material import Material
+from benchmarks.report.tables import fixes, leaderboard, limits, lost
+from benchmarks.runner import results as stored
+from benchmarks.runner import run_verb
+from benchmarks.runner.definition import load_suite
+from benchmarks.runner.execute import carry_out
+from benchmarks.runner.plan import cells_of
+from benchmarks.runner.store import Store
+from estimators.dead_reckoning import DeadReckoning
+from fusion import Pose
+from fusion.values import nanoseconds
+
+SUITE = """
+[suite]
+name = "lost"
+eval = {{ reading = "{reading}" }}
+[[runs]]
+id = "office"
+scenario = "office"
+duration_s = 12.0
+[[estimators]]
+id = "wheels"
+use = "dead_reckoning"
+[[estimators]]
+id = "poisoned"
+use = "toy_poisoned"
+[[estimators]]
+id = "radio"
+use = "radio_only"
+[[faults]]
+id = "silence"
+apply = [{{ kind = "drop", topic = "wifi", windows = [[3.0, 12.0]] }}]
+"""
+FLATTERING = ("pos_rmse", "pos_mean", "pos_max", "head_rmse", "anees", "along_rmse", "rpe_t_1s_rmse", "energy")
+CAUSE = "it answers x nan m, y nan m, heading nan rad, "
+
+
+class Poisoned(DeadReckoning):
+    """Dead reckoning that answers NaN from the second second on."""
+
+    __module__ = DeadReckoning.__module__  # a suite hashes the code of an estimator's package, and tests are none
+
+    def estimate(self, state, time_ns):
+        answer = super().estimate(state, time_ns)
+        return answer if time_ns < nanoseconds(2.0) else answer._replace(pose=Pose(*[math.nan] * 3))
+
+
+@pytest.fixture(scope="module", params=["causal", "interp"])
+def material(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(request.param)
+    (folder / "suite.toml").write_text(SUITE.format(reading=request.param), encoding="utf-8")
+    suite, store = load_suite(folder / "suite.toml"), Store(folder / "store")
+    with fusion.registered("toy_poisoned", Poisoned):
+        cells = cells_of(suite, store)
+        for cell in cells:
+            carry_out((cell, store.folder))
+        yield Material(suite, stored.read_results(cells, store), store)
+
+
+def of(material, contestant, fault="clean"):
+    (found,) = [one for one in material.results if (one.cell.contestant.id, one.cell.fault.id) == (contestant, fault)]
+    return found
+
+
+def test_answer_that_is_no_number_loses_the_cell_with_its_reason(material):
+    poisoned = of(material, "poisoned")
+    assert poisoned.status == "diverged"
+    assert poisoned.error.startswith(CAUSE)
+    assert (poisoned.metrics["availability"], poisoned.metrics["pos_p75"]) == (0.0, math.inf)
+    assert all(math.isfinite(of(material, "wheels").metrics[name]) for name in FLATTERING)
+    assert all(math.isnan(poisoned.metrics[name]) for name in FLATTERING)
+    assert poisoned.worst_at_s is None
+
+
+def test_cell_that_fell_silent_keeps_its_availability_and_no_mean_of_its_answers(material):
+    silent = of(material, "radio", "silence")
+    assert silent.status == "diverged"
+    assert 0.0 < silent.metrics["availability"] <= 0.5
+    assert silent.error == f"only {100.0 * silent.metrics['availability']:.1f} % of the instants have a valid answer"
+    assert all(math.isnan(silent.metrics[name]) for name in FLATTERING)
+    assert silent.metrics["pos_p75"] == math.inf
+
+
+def test_leaderboards_show_a_dash_and_the_run_tells_why(material):
+    for sheet in (stored.leaderboard(material.results), leaderboard(material)):
+        (row,) = [row for row in sheet.rows if row[0] == "poisoned"]
+        shown = dict(zip(sheet.head, row, strict=True))
+        assert [
+            text for title, text in shown.items() if title.startswith(("RMSE", "mean", "max", "heading", "ANEES"))
+        ] == ["–"] * 5
+        assert sheet.rows[-1][0] == "poisoned"
+    told = run_verb.lost(material.results)
+    assert any(line.startswith(f"poisoned lost 2 of its cells: {CAUSE}") for line in told)
+    assert any(line.startswith("radio lost 1 of its cells: only ") for line in told)
+
+
+def test_report_says_why_and_compares_no_lost_cell_with_physics(material):
+    reasons = {row[0].partition("]")[0]: row[2] for row in lost(material).rows}
+    assert reasons["[office poisoned clean 0"].startswith(f"`{CAUSE}")
+    for sheet in (limits(material), fixes(material)):
+        shown = {row[0]: row[1] for row in sheet.rows}
+        assert shown["poisoned"] == "–" != shown["wheels"]
