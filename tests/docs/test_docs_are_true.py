@@ -77,3 +77,15 @@ def resolved(parts):
 def test_every_script_named_exists(page):
     for script in re.findall(r"\w[\w/]*/[a-z0-9_]+\.py\b", page.read_text(encoding="utf-8")):
         assert (ROOT / script).is_file(), script
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: page.name)
+def test_every_test_named_exists(page):
+    """By its whole name, by its beginning with an ellipsis, or by its file."""
+    paths = list((ROOT / "tests").rglob("test_*.py"))
+    tests = [name for path in paths for name in re.findall(r"^def (test_\w+)", path.read_text(encoding="utf-8"), re.M)]
+    for name, end in re.findall(r"`(test_\w+?)(…|\.py)?`", page.read_text(encoding="utf-8")):
+        if end == ".py":
+            assert name in [path.stem for path in paths], name
+        else:
+            assert any(test == name or (end and test.startswith(name)) for test in tests), name

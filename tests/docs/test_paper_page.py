@@ -30,11 +30,6 @@ def test_code_named_for_an_equation_exists(place):
         found = getattr(found, part)
 
 
-@pytest.mark.parametrize("name", sorted(set(re.findall(r"`(test_\w+)`", PAGE))))
-def test_test_named_for_an_equation_exists(name):
-    assert any(f"def {name}(" in path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
-
-
 def test_page_was_made_of_at_least_200_runs():
     assert RECORD["trials"] >= 200
 
