@@ -32,8 +32,11 @@ from fusion import (
     Truth,
 )
 from fusion.cli import main
+from fusion.timeline import order
 from logs.run import Run, TruthTrack
 from logs.writer import RunWriter
+from tests.fusion.streams import WORLD as ANCHORED
+from tests.fusion.streams import CountingWorld, ranges
 
 TENTH_NS = 100_000_000
 WORLD = fusion.World.from_table({"name": "corridor", "bounds": {"x_min": 0, "x_max": 8, "y_min": -1, "y_max": 3}})
@@ -327,6 +330,19 @@ def test_lane_keeps_what_was_said_before_the_crash():
     assert len(lane.updates) == 30
     assert "half way" in lane.error
     assert len(lane.final) == 30
+
+
+def test_measurements_of_a_run_are_screened_and_integrated_once_for_all_its_lanes():
+    counting = CountingWorld(ANCHORED)
+    scans = tuple(ranges(k * TENTH_NS + 1, k) for k in range(5, 60, 5))
+    measurements = tuple(sorted([*run_in_memory().measurements, *scans], key=order))
+    run = run_in_memory(world=counting, measurements=measurements)
+    lanes = [run_lane(run, name, seed=seed) for name in ("toy_wheels", "toy_quiet") for seed in range(3)]
+    assert counting.asked == dict.fromkeys("abc", len(scans))
+    first, *others = ([epoch for update in lane.updates for epoch in update.epochs] for lane in lanes)
+    assert len(first) == len(scans)
+    for epochs in others:
+        assert all(mine.motion is theirs.motion for mine, theirs in zip(epochs, first, strict=True))
 
 
 def test_prior_of_the_log_goes_before_the_truth_and_the_truth_before_nothing():

@@ -1,5 +1,7 @@
-"""Streams of measurements, and an estimator that keeps a ledger of what the host gives it."""
+"""Streams of measurements, a world that counts, and an estimator that keeps a ledger of what the host gives it."""
 
+from collections import Counter
+from dataclasses import fields
 from functools import reduce
 
 from hypothesis import strategies as st
@@ -102,6 +104,19 @@ def joined(epochs):
 
 def last_words(updates):
     return [(update.measurement, update.fates, update.estimate) for update in final(updates)]
+
+
+class CountingWorld(World):
+    """A world that counts how often it is asked for an anchor: once for each reading that is screened."""
+
+    def __init__(self, world):
+        for field in fields(World):
+            object.__setattr__(self, field.name, getattr(world, field.name))
+        object.__setattr__(self, "asked", Counter())
+
+    def anchor(self, anchor_id):
+        self.asked[anchor_id] += 1
+        return super().anchor(anchor_id)
 
 
 class Ledger:

@@ -38,6 +38,7 @@ from fusion import (
     compose,
     digest,
     final,
+    generator,
     sightings,
     track,
     wrap_angle,
@@ -430,6 +431,33 @@ def test_same_measurement_twice_counts_once():
 
 def test_stamp_hours_ahead_is_not_believed_at_once():
     assert fates_of(Gyro(10**5 * SECOND, "g", 0, 0.0)) == [("", Decision.UNUSABLE, Reason.BAD_CLOCK)]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_gyro_that_is_not_the_source_of_turns_is_unusable_to_every_estimator_alike(name):
+    measurements, _ = drive(seconds=3)
+    gyro = [Gyro(k * SECOND // 4 + 1, "gyro", k, 0.2) for k in range(1, 12)]
+    place = world()
+    without, with_gyro = (
+        list(track(build(name, place), place, stream, prior(), seed=3))
+        for stream in (measurements, sorted([*measurements, *gyro], key=lambda m: m.time_ns))
+    )
+    ignored = [update for update in with_gyro if isinstance(update.measurement, Gyro)]
+    verdicts = {(f.anchor, f.decision, f.reason, f.weight) for update in ignored for f in update.fates}
+    assert [len(update.fates) for update in ignored] == [1] * len(gyro)
+    assert verdicts == {("", Decision.UNUSABLE, Reason.KIND_NOT_CONSUMED, 0.0)}
+    assert digest(without) == digest(update for update in with_gyro if update not in ignored)
+
+
+NAMED = {"seed": 1, "time_ns": 5 * SECOND, "sensor": "uwb", "seq": 7, "purpose": 0}
+
+
+@pytest.mark.parametrize(
+    "other", [{}, {"seed": 2}, {"time_ns": 6 * SECOND}, {"sensor": "wifi"}, {"seq": 8}, {"purpose": 1}], ids=str
+)
+def test_random_numbers_of_an_epoch_are_named_by_it_and_the_seed_alone(other):
+    one, again = generator(**NAMED), generator(**NAMED | other)
+    assert (one.random(8).tolist() == again.random(8).tolist()) is (not other)
 
 
 def test_unusable_readings_are_named_one_by_one():

@@ -43,6 +43,7 @@ from tests.fusion.streams import (
 NOISE = OdometryNoise()
 GYRO_WORLD = replace(WORLD, robot=replace(WORLD.robot, turn_source="gyro"))
 SHORT = Longest(path_m=0.6, turn_rad=2.5, duration_s=0.7)
+RULE = Longest(path_m=20.0, turn_rad=6.25, duration_s=30.0)
 NEVER = Longest(math.inf, math.inf, math.inf)
 
 
@@ -189,7 +190,7 @@ def test_errors_of_many_robots_correct_a_motion_as_those_of_each():
 )
 def test_stretch_is_closed_by_path_turn_and_time(distance_m, turn_rad, period_ns, closing):
     measurements = [odometry(k, distance_m, turn_rad, period_ns) for k in range(1, 2 * closing + 2)]
-    closed = [(m.time_ns, len(m.epochs)) for m in moments_of(measurements) if m.epochs]
+    closed = [(m.time_ns, len(m.epochs)) for m in moments_of(measurements, longest=RULE) if m.epochs]
     assert closed == [(closing * period_ns, 1), (2 * closing * period_ns, 1)]
 
 
@@ -214,13 +215,14 @@ def test_first_order_holds_over_the_longest_stretch(turn_rad, turn_error, turn_b
 
 def test_path_counts_both_ways_and_turns_there_and_back_do_not():
     forth_and_back = [odometry(k, 0.5 * (-1) ** k, 0.0) for k in range(1, 41)]
-    assert [m.time_ns for m in moments_of(forth_and_back) if m.epochs] == [4 * SECOND]
+    assert [m.time_ns for m in moments_of(forth_and_back, longest=RULE) if m.epochs] == [4 * SECOND]
     left_and_right = [odometry(k, 0.0, 2.0 * (-1) ** k) for k in range(1, 200)]
-    assert epochs_of(moments_of(left_and_right)) == []
+    assert epochs_of(moments_of(left_and_right, longest=RULE)) == []
 
 
 def test_closed_stretch_ends_with_its_last_message_and_the_next_begins_there():
-    first, second = epochs_of(moments_of([odometry(k, 1.0, 0.0, SECOND) for k in range(1, 41)]))
+    measurements = [odometry(k, 1.0, 0.0, SECOND) for k in range(1, 41)]
+    first, second = epochs_of(moments_of(measurements, longest=RULE))
     assert (first.time_ns, first.scan, first.motion.time_ns) == (20 * SECOND, None, 20 * SECOND)
     assert second.motion == first.motion._replace(time_ns=40 * SECOND)
 
@@ -228,13 +230,14 @@ def test_closed_stretch_ends_with_its_last_message_and_the_next_begins_there():
 def test_scan_begins_a_new_stretch():
     """10 m, a scan, 15 m: neither is long."""
     measurements = [odometry(k, 1.0, 0.0, SECOND) for k in range(1, 26)]
-    (epoch,) = epochs_of(moments_of([*measurements[:10], ranges(10 * SECOND), *measurements[10:]]))
+    measurements.insert(10, ranges(10 * SECOND))
+    (epoch,) = epochs_of(moments_of(measurements, longest=RULE))
     assert epoch.scan == ranges(10 * SECOND)
     assert epoch.motion.path_m == pytest.approx(10.0)
 
 
 def test_gap_in_all_sensors_is_closed_before_the_scan_that_ends_it():
-    closed, seen = epochs_of(moments_of([odometry(1, 0.1, 0.0), ranges(60 * SECOND)]))
+    closed, seen = epochs_of(moments_of([odometry(1, 0.1, 0.0), ranges(60 * SECOND)], longest=RULE))
     assert (closed.scan, closed.time_ns) == (None, 60 * SECOND)
     assert closed.motion.unmeasured_s == pytest.approx(60.0 - 0.1 - 0.5)
     assert seen.motion == Increment(time_ns=60 * SECOND)

@@ -75,7 +75,7 @@ def test_late_odometry_is_put_in_its_place_and_what_follows_made_again(late_ms):
     own = next(i for i, moment in enumerate(moments) if moment.measurement is late)
     again = [moment for moment in moments if moment.revised]
     assert not moments[own].revised
-    assert [moment.measurement for moment in again] == [m for m in in_order if late.time_ns < m.time_ns][: len(again)]
+    assert [moment.measurement for moment in again] == [m for m in arrived[:place] if m.time_ns > late.time_ns]
     assert moments[own + 1 : own + 1 + len(again)] == again
     assert repr(epochs_of(moments)) == repr(epochs_of(moments_of(in_order)))
 

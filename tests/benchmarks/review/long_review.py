@@ -20,6 +20,8 @@ from fusion import (
     Decision,
     Estimate,
     Fate,
+    Increment,
+    Moment,
     Odometry,
     Particles,
     Pose,
@@ -58,11 +60,10 @@ def long_run(poses: int) -> Run:
     return Run(Path("long.mcap"), "long", WORLD, None, {}, tuple(measurements), TruthTrack.from_truths(truths), (), {})
 
 
-class MadeUpTracker:
+class MadeUpFold:
     """Shows a new cloud of a thousand particles whenever it is asked."""
 
     def __init__(self) -> None:
-        self.time_ns = 0
         self._random = np.random.default_rng(1)
 
     def particles(self) -> Particles:
@@ -72,10 +73,9 @@ class MadeUpTracker:
 
 def watched(run: Run) -> CloudWatch:
     """The clouds of an estimator that has particles."""
-    watch, tracker = CloudWatch(run), MadeUpTracker()
+    watch, fold = CloudWatch(run), MadeUpFold()
     for measurement in run.measurements:
-        tracker.time_ns = measurement.time_ns
-        watch(tracker, measurement)
+        watch(fold, Moment(measurement, (), 0, (), Increment(), measurement.time_ns, 0))
     return watch
 
 
