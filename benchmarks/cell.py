@@ -16,13 +16,14 @@ from typing import NamedTuple
 import numpy as np
 
 import fusion
-from benchmarks.lane import Lane, run_lane
+from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.innovations import innovation_metrics, nis_metrics
-from benchmarks.metrics.instants import availability, evaluation_instants, match
+from benchmarks.metrics.matching import availability, match
 from benchmarks.metrics.score import Errors, errors, for_json, metrics, metrics_of_lost, unanswered
-from benchmarks.metrics.track import Track
+from benchmarks.runner.estimator_run import Lane, run_lane
 from logs.reader import read_run
 from logs.run import Run
+from logs.truth import evaluation_instants
 
 LEAST_AVAILABILITY = 0.5
 """An estimator with valid answers at no more than this share of instants counts as diverged: its median is infinite."""

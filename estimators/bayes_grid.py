@@ -13,15 +13,6 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from estimators.sampling import (
-    Array,
-    carried,
-    judged,
-    mixture,
-    moments,
-    repeated_variance,
-    require_most_alike,
-)
 from fusion import (
     Covariance,
     Estimate,
@@ -39,6 +30,9 @@ from fusion import (
     sightings,
 )
 from fusion.belief import HEADING_KNOWN_STD
+from fusion.correlated_error import repeated_variance, require_most_alike
+from fusion.fates import judged
+from fusion.weighted_points import Array, carried, mixture, moments
 
 
 class State(NamedTuple):

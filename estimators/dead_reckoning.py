@@ -23,7 +23,7 @@ from fusion import (
     compose,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.screen import unusable
+from fusion.fates import unusable
 
 
 class State(NamedTuple):

@@ -27,8 +27,8 @@ from fusion import (
 )
 from fusion.belief import starting_belief
 from fusion.errors import did_you_mean
-from fusion.fix import Recent, fix_fates, fix_from, remember
-from fusion.screen import unusable
+from fusion.fates import fix_fates, unusable
+from fusion.position_fix import Recent, fix_from, remember
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds
 

@@ -35,8 +35,8 @@ from fusion import (
     sightings,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.fix import Recent, fix_fates, fix_from, fix_innovation, remember
-from fusion.screen import unusable
+from fusion.fates import fix_fates, unusable
+from fusion.position_fix import Recent, fix_from, fix_innovation, remember
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds
 

@@ -10,13 +10,11 @@ their order does not matter (Bar-Shalom, Li & Kirubarajan 2001, section 5.4 and 
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.sampling import require_most_alike, sharing
 from fusion import (
     Covariance,
     Decision,
@@ -37,6 +35,8 @@ from fusion import (
     wrap_angle,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
+from fusion.correlated_error import require_most_alike, sharing
+from fusion.fates import chi_square_gate
 from fusion.radio import PathLoss, Ranging
 
 Array = NDArray[np.float64]
@@ -226,14 +226,3 @@ def _state(mean: Array, covariance: Array, path_m: float) -> State:
     """The state, its heading wrapped and its covariance symmetric to the last bit."""
     mean[HEADING] = wrap_angle(float(mean[HEADING]))
     return State(mean, 0.5 * (covariance + covariance.T), path_m)
-
-
-def chi_square_gate(probability: float) -> float:
-    """The quantile of chi-square with one degree of freedom: the square of the normal's two-sided quantile.
-
-    >>> round(chi_square_gate(0.99), 4)
-    6.6349
-    """
-    from statistics import NormalDist
-
-    return math.inf if probability == 1.0 else NormalDist().inv_cdf(0.5 + 0.5 * probability) ** 2

@@ -2,7 +2,7 @@
 
 filterpy's object lives for one call: the belief is copied in, predicted or updated, and copied out, so the state stays
 a value. Time, gate and Fates are ours; filterpy has none of them. All readings of a scan enter in one update, those
-beyond the gate left out, so their order does not matter. `estimators/filterpy_ukf.py` differs only in how a belief is
+beyond the gate left out, so their order does not matter. `estimators/filterpy_ekf.py` differs only in how a belief is
 predicted and compared with readings.
 """
 
@@ -15,8 +15,6 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from estimators.ekf import chi_square_gate
-from estimators.sampling import Array, repeated_variance, require_most_alike, total_variance
 from fusion import (
     Covariance,
     Decision,
@@ -36,6 +34,9 @@ from fusion import (
     wrap_angle,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
+from fusion.correlated_error import repeated_variance, require_most_alike, total_variance
+from fusion.fates import chi_square_gate
+from fusion.weighted_points import Array, square_root
 
 if find_spec("filterpy") is None:
     # Its import takes a second, and waits until it is used; that it is missing is known at once.
@@ -171,3 +172,52 @@ def copied_out(belief: Any) -> tuple[Pose, Covariance]:  # noqa: ANN401
     x, y, heading = np.ravel(belief.x).tolist()
     p = (0.5 * (belief.P + belief.P.T)).tolist()
     return Pose(x, y, wrap_angle(heading)), Covariance.from_matrix(p)
+
+
+class FilterpyUkf(FilterpyFilter):
+    """The ``UnscentedKalmanFilter`` of filterpy.
+
+    Parameters
+    ----------
+    gate_probability
+        A reading is refused when its normalised innovation squared is beyond this quantile of chi-square with one
+        degree of freedom. 1.0 takes every reading.
+    most_alike
+        How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
+        takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
+        20 where the world tells its `shadowing_length_m`, else 3.
+    """
+
+    summary: ClassVar[str] = "unscented Kalman filter of filterpy"
+
+    def _predicted(self, state: State, motion: Increment) -> Any:  # noqa: ANN401 - filterpy is not typed
+        kalman = filterpy_kalman()
+        points = kalman.MerweScaledSigmaPoints(3, alpha=0.5, beta=2.25, kappa=0.0, sqrt_method=square_root)
+        belief = kalman.UnscentedKalmanFilter(
+            dim_x=3, dim_z=1, dt=0.0, hx=None, fx=lambda x, _: moved(x, motion), points=points
+        )
+        belief.x, belief.P = np.array(state.pose), np.array(state.covariance.matrix)
+        belief.Q = np.array(move(state.pose.heading, motion).noise.matrix)
+        belief.predict()
+        return belief
+
+    def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
+        expected = self._expected_at(belief.sigmas_f, readings)
+        values = belief.Wm @ expected
+        return values, belief.Wc @ np.square(expected - values)
+
+    def _correct(self, belief: Any, readings: Readings, noise: Array) -> None:  # noqa: ANN401
+        seen = np.array([sighting.value for sighting in readings])
+        belief.update(seen, R=noise, hx=lambda x: self._expected_at(x[None, :], readings)[0])
+
+    def _expected_at(self, poses: Array, readings: Readings) -> Array:
+        """Expected readings (n, m) at ``poses`` (n, 3)."""
+        antenna_m = self._world.robot.antenna_m
+        x, y, heading = poses.T
+        columns = [sighting.expected_values(x, y, heading, antenna_m) for sighting in readings]
+        return np.array(columns).reshape(-1, len(poses)).T
+
+
+def moved(x: Array, motion: Increment) -> Array:
+    """The pose ``x`` (3,) after ``motion``; the heading is not wrapped, so that differences of poses stay plain."""
+    return np.asarray(x + np.array(move(float(x[2]), motion)[:3]))

@@ -14,15 +14,6 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from estimators.sampling import (
-    Array,
-    judged,
-    mixture,
-    moments,
-    repeated_variance,
-    require_most_alike,
-    square_root,
-)
 from fusion import (
     Covariance,
     Estimate,
@@ -40,6 +31,9 @@ from fusion import (
     sightings,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
+from fusion.correlated_error import repeated_variance, require_most_alike
+from fusion.fates import judged
+from fusion.weighted_points import Array, mixture, moments, square_root
 
 KERNEL = 0.1
 """Width of the resampling kernel as a share of the cloud's own standard deviation (Liu & West: small, e.g. 0.1)."""

@@ -19,8 +19,8 @@ from fusion import (
     World,
     sightings,
 )
-from fusion.fix import Recent, fix_from, remember
-from fusion.screen import unusable
+from fusion.fates import unusable
+from fusion.position_fix import Recent, fix_from, remember
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds
 

@@ -44,14 +44,14 @@ from fusion.errors import (
     WorldError,
 )
 from fusion.estimator import Estimator, ParticleEstimator, Particles, Tag, generator
+from fusion.fates import unusable
 from fusion.fold import Fold, Update
 from fusion.geometry import Covariance, Pose, wrap_angle
 from fusion.motion import Increment, Move, compose, move
 from fusion.plugins import available, build, built_in_names, load, names, registered
-from fusion.screen import unusable
-from fusion.sighting import Sighting, sightings
+from fusion.radio_reading import Sighting, sightings
 from fusion.timeline import Moment, Timeline
-from fusion.track import Tracker, final, track
+from fusion.tracker import Tracker, final, track
 from fusion.values import (
     Decision,
     Estimate,

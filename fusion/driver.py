@@ -1,9 +1,9 @@
 """The contract every driver keeps: four methods around one device, and what can be known of it without the device.
 
 A driver is a class built as ``Class(name, clock, **settings)``; building one touches no device. It never reconnects by
-itself, never sleeps longer than it is told to, never repeats an old value: whoever runs it (`sensors.onboard.keeper`)
-owns retries, watchdog and threads. Parsing is pure functions of bytes, apart from the driver. `docs/drivers.md` shows
-how.
+itself, never sleeps longer than it is told to, never repeats an old value: whoever runs it
+(`sensors.onboard.driver_lifecycle`) owns retries, watchdog and threads. Parsing is pure functions of bytes, apart from
+the driver. `docs/drivers.md` shows how.
 """
 
 from __future__ import annotations

@@ -12,9 +12,10 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from fusion.fates import unusable
 from fusion.motion import Increment
 from fusion.odometry import Odometer, OdometerState
-from fusion.screen import screen, unusable
+from fusion.screen import screen
 from fusion.values import Fate, Gyro, Measurement, Odometry, Radio, Ranges, Reason, WifiScan
 from fusion.world import World
 

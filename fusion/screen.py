@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from fusion.fates import fate, unusable
 from fusion.values import (
     Decision,
     Fate,
@@ -25,22 +26,6 @@ MAX_READING_AGE_NS = nanoseconds(3.0)
 """Oldest reading of a scan still taken: a radio may list an anchor long after it was last heard."""
 RSSI_RANGE_DBM = (-120.0, 20.0)
 """Signal strengths a receiver can report; others are codes for "nothing heard", such as 0 x 256 or 127."""
-
-
-def fate(measurement: Measurement, anchor: str, decision: Decision, reason: Reason) -> Fate:
-    """A Fate of weight zero: this reading moved nothing."""
-    return Fate(measurement.time_ns, measurement.sensor, measurement.seq, anchor, decision, reason, 0.0)
-
-
-def refused(measurement: Measurement, decision: Decision, reason: Reason) -> tuple[Fate, ...]:
-    """The Fates of a measurement none of whose readings could be used: one per anchor, or one without."""
-    anchors = [r.anchor for r in measurement.readings] if isinstance(measurement, WifiScan | Ranges) else [""]
-    return tuple(fate(measurement, anchor, decision, reason) for anchor in anchors)
-
-
-def unusable(measurement: Measurement, reason: Reason) -> tuple[Fate, ...]:
-    """`refused` because the readings themselves are unusable."""
-    return refused(measurement, Decision.UNUSABLE, reason)
 
 
 def screen(world: World, measurement: Measurement) -> tuple[Measurement | None, tuple[Fate, ...]]:

@@ -14,8 +14,8 @@ from operator import attrgetter
 from typing import NamedTuple
 
 from fusion.epochs import LONGEST, Epoch, FrontEnd, FrontEndState, Longest
+from fusion.fates import refused, unusable
 from fusion.motion import Increment
-from fusion.screen import refused, unusable
 from fusion.values import Decision, Fate, Measurement, Odometry, Ranges, Reason, WifiScan, nanoseconds
 from fusion.world import World
 

@@ -12,11 +12,12 @@ from mcap.records import Message
 
 from fusion import BeliefError, Estimate, FusionError, LogError, Measurement, Prior, Remark, Truth, World
 from logs import device_messages, messages
-from logs.damage import Damage
 from logs.device_messages import ClockSync
+from logs.message_stream import Walk
 from logs.messages import DECODERS, ESTIMATE_TOPIC, FATES_TOPIC
-from logs.run import Run, TruthTrack, left_out
-from logs.walk import Walk
+from logs.run import Run, left_out
+from logs.salvage.damage import Damage
+from logs.truth import TruthTrack
 from logs.wheel_direction import caution_of_run
 from logs.writer import RUN_RECORD
 

@@ -6,41 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fusion import Estimate, Measurement, Prior, Remark, Truth, World
+from fusion import Estimate, Measurement, Prior, Remark, World
 from fusion.timeline import Key
 from logs.device_messages import ClockSync
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TruthTrack:
-    """Ground truth as columns of one length n, in time order: time [ns], x, y [m], heading [rad] (NaN: not known)."""
-
-    time_ns: NDArray[np.int64]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    heading: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.time_ns)
-
-    def at(self, rows: NDArray[np.bool_]) -> TruthTrack:
-        """Some of it, by mask."""
-        return TruthTrack(self.time_ns[rows], self.x[rows], self.y[rows], self.heading[rows])
-
-    @classmethod
-    def from_truths(cls, truths: Sequence[Truth]) -> TruthTrack:
-        """Columns, read-only, from single truths: those with a position; of two at one time the first counts."""
-        ordered = sorted((truth for truth in truths if truth.position_known), key=lambda truth: truth.time_ns)
-        unique = [truth for i, truth in enumerate(ordered) if i == 0 or truth.time_ns != ordered[i - 1].time_ns]
-        time_ns = np.array([truth.time_ns for truth in unique], dtype=np.int64)
-        x, y = np.array([t.x for t in unique], dtype=np.float64), np.array([t.y for t in unique], dtype=np.float64)
-        heading = np.array([np.nan if t.known_heading is None else t.heading for t in unique], dtype=np.float64)
-        for column in (time_ns, x, y, heading):
-            column.flags.writeable = False
-        return cls(time_ns, x, y, heading)
+from logs.truth import TruthTrack
 
 
 def left_out(placed: Sequence[bool]) -> list[str]:

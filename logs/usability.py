@@ -6,31 +6,27 @@ that use motion alone: odometry) that enters its state.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import fusion
 from fusion import (
-    Covariance,
     Decision,
     Estimator,
     Fate,
     FusionError,
     Measurement,
     Odometry,
-    Pose,
     Prior,
     Ranges,
     Tag,
-    Truth,
     Update,
     WheelTicks,
     WifiScan,
     track,
 )
-from logs.recording import prior_from_truth
+from logs.prior import _start
 from logs.run import Run
 
 SCANS = 50
@@ -104,20 +100,3 @@ def _excerpt(measurements: Sequence[Measurement]) -> Sequence[Measurement]:
     """The beginning of a run: up to enough radio messages, and to the first one however late it comes."""
     scans = [i + 1 for i, measurement in enumerate(measurements) if isinstance(measurement, WifiScan | Ranges)][:SCANS]
     return measurements[: max(scans[0], min(scans[-1], MESSAGES)) if scans else MESSAGES]
-
-
-def _start(run: Run) -> Prior:
-    """The log's prior, else the first true pose, else nothing known; not later than the first measurement."""
-    if run.prior is not None:
-        return run.prior
-    begin_ns = min((m.from_ns if isinstance(m, Odometry) else m.time_ns for m in run.measurements), default=0)
-    if run.truth is not None:
-        x, y, heading = (float(column[0]) for column in (run.truth.x, run.truth.y, run.truth.heading))
-        known = None if math.isnan(heading) else heading
-        prior, _ = prior_from_truth([], [Truth(begin_ns, x, y, known)] if math.isfinite(x + y) else [])
-        if prior is not None:
-            return prior
-    floor = run.world.bounds
-    middle = Pose(0.5 * (floor.x_min + floor.x_max), 0.5 * (floor.y_min + floor.y_max), 0.0)
-    wide = Covariance.from_std(floor.x_max - floor.x_min, floor.y_max - floor.y_min, math.pi)
-    return Prior(begin_ns, middle, wide, position_known=False, heading_known=False)

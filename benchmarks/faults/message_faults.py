@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from benchmarks.faults.fault_kind import Fault
-from benchmarks.faults.rows import TOPICS, Floats, Mask, Windows
-from benchmarks.faults.tape import Tape
+from benchmarks.faults.fault import Fault
+from benchmarks.faults.row_selection import TOPICS, Floats, Mask, Windows
+from benchmarks.faults.run_columns import Tape
 from fusion import ParameterError
 from fusion.values import NANOSECONDS
 

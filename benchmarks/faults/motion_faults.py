@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.faults.fault_kind import Fault
-from benchmarks.faults.rows import Windows
-from benchmarks.faults.tape import Tape
-from benchmarks.prior import starting_prior
+from benchmarks.faults.fault import Fault
+from benchmarks.faults.row_selection import Windows
+from benchmarks.faults.run_columns import Tape
 from fusion import ParameterError, Pose, wrap_angle
+from logs.prior import starting_prior
 
 WHEELS = {
     "differential": ("left", "right"),

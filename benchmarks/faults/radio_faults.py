@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from benchmarks.faults.fault_kind import Fault
-from benchmarks.faults.rows import Floats, Mask, Windows
-from benchmarks.faults.tape import Tape
+from benchmarks.faults.fault import Fault
+from benchmarks.faults.row_selection import Floats, Mask, Windows
+from benchmarks.faults.run_columns import Tape
 
 RADIO_TOPICS = ("ranges", "wifi")
 RESOLUTIONS_DB = (1.0, 0.5, 0.1)

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.metrics.course import Instants
-from benchmarks.metrics.instants import Answers
+from benchmarks.metrics.matching import Answers
 from fusion import ParameterError, Pose
 from fusion.errors import did_you_mean
+from logs.truth import Instants
 
 ALIGNMENTS = ("se2", "origin")
 STATIC = 1e-9

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.metrics.deviation import Errors
-from benchmarks.metrics.quantiles import known, mean
-from benchmarks.metrics.track import Flags, Floats, Whole
+from benchmarks.metrics.errors import Errors
+from fusion.arrays import Flags, Floats, Whole
+from fusion.quantiles import known, mean
 
 CHI_SQUARE_95 = {1: 3.841458820694124, 2: 5.991464547107979, 3: 7.814727903251179}
 """Values a chi-square variable of 1, 2 and 3 degrees of freedom exceeds once in twenty."""
@@ -51,6 +51,6 @@ def consistency_metrics(measured: Errors, claimed: Claimed) -> dict[str, float]:
 
 
 def distribution_metrics(measured: Errors) -> dict[str, float]:
-    """Proper scores, means over the instants with a claim, smaller is better: see `benchmarks.metrics.claims`."""
+    """Proper scores (`benchmarks.metrics.proper_scores`), means over the instants with a claim; smaller is better."""
     columns = {"nll_3d": measured.nll, "nll_2d": measured.nll_2d, "energy": measured.energy}
     return {name: mean(known(column)) for name, column in columns.items()}

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.metrics.deviation import Errors
-from benchmarks.metrics.quantiles import mean
-from benchmarks.metrics.track import Floats
+from benchmarks.metrics.errors import Errors
+from fusion.arrays import Floats
+from fusion.quantiles import mean
 
 LEAST_SEEDS = 5
 """Of fewer, the mean square of three numbers is hardly known."""

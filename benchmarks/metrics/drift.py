@@ -6,9 +6,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.metrics.deviation import Errors
-from benchmarks.metrics.quantiles import quantile
-from benchmarks.metrics.track import Floats, Whole
+from benchmarks.metrics.errors import Errors
+from fusion.arrays import Floats, Whole
+from fusion.quantiles import quantile
 
 MOST_PAIRS = 3000
 """Slopes that a median is taken of. Of more pairs than these every k-th is used: the median then strays a tenth more

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.metrics.track import Flags, Floats, Stamps, Whole
 from fusion import Decision, Fate, Gyro, MotorCommand, Odometry, Ranges, Reason, Update, WheelTicks, WifiScan
+from fusion.arrays import Flags, Floats, Stamps, Whole
 
 Codes = NDArray[np.int16]
 

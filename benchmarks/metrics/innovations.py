@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.metrics.consistency import CHI_SQUARE_95
+from benchmarks.metrics.effective_samples import effective_sizes, mean_chi_square_band
 from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.intervals import CEILING
-from benchmarks.metrics.quantiles import mean
-from benchmarks.metrics.samples import effective_sizes, mean_chi_square_band
-from benchmarks.metrics.track import Floats
+from fusion.arrays import Floats
+from fusion.quantiles import mean
 
 NAMES = ("wifi", "ranges", "gyro", "ticks", "command", "odom")
 """Of `benchmarks.metrics.fates.KINDS`."""

@@ -10,11 +10,11 @@ import math
 import numpy as np
 
 from benchmarks.metrics.consistency import Claimed
-from benchmarks.metrics.deviation import Errors
+from benchmarks.metrics.effective_samples import binomial_interval, effective_sizes, mean_chi_square_band, order_shares
+from benchmarks.metrics.errors import Errors
 from benchmarks.metrics.position import AUC_RADIUS_M, POSITION_QUANTILES
-from benchmarks.metrics.quantiles import Ordered, mean
-from benchmarks.metrics.samples import binomial_interval, effective_sizes, mean_chi_square_band, order_shares
-from benchmarks.metrics.track import Floats
+from fusion.arrays import Floats
+from fusion.quantiles import Ordered, mean
 
 CEILING = 1e6
 """For the correlation in time alone, a NEES counts as no more: beyond, one instant would hide all others."""

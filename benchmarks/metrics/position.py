@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from benchmarks.metrics.deviation import Errors
-from benchmarks.metrics.quantiles import Ordered, mean, means, quantile, quantiles, root_mean_square, root_mean_squares
-from benchmarks.metrics.track import Flags, Floats, points
+from benchmarks.metrics.errors import Errors
+from fusion.arrays import Flags, Floats, points
+from fusion.quantiles import Ordered, mean, means, quantile, quantiles, root_mean_square, root_mean_squares
 
 AUC_RADIUS_M = 3.0
 POSITION_QUANTILES = {"pos_p50": 0.50, "pos_p75": 0.75, "pos_p90": 0.90, "pos_p95": 0.95, "pos_p99": 0.99}

@@ -11,16 +11,16 @@ import math
 from collections.abc import Mapping
 
 from benchmarks.metrics.consistency import CHI_SQUARE_95, Claimed, consistency_metrics, distribution_metrics
-from benchmarks.metrics.course import Instants
-from benchmarks.metrics.deviation import Errors, errors, pool
+from benchmarks.metrics.convergence import dynamic_metrics
 from benchmarks.metrics.drift import drift_metrics
-from benchmarks.metrics.dynamics import dynamic_metrics
-from benchmarks.metrics.instants import match
+from benchmarks.metrics.errors import Errors, errors, pool
+from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.intervals import interval_metrics, quantile_intervals
+from benchmarks.metrics.matching import match
 from benchmarks.metrics.position import axis_metrics, heading_metrics, position_metrics, track_metrics
-from benchmarks.metrics.quantiles import Ordered, quantile
-from benchmarks.metrics.track import Track
-from benchmarks.metrics.trajectory import trajectory_metrics
+from benchmarks.metrics.relative_pose import trajectory_metrics
+from fusion.quantiles import Ordered, quantile
+from logs.truth import Instants
 
 METRICS_VERSION = 10
 """Changes whenever a metric does, so that stored scores are not taken for current ones."""

@@ -1,8 +1,8 @@
 """What the paper does not tell, filled in: the way the experiments are run, and other ways that would do as well.
 
-Two numbers of every filling are calibrated (`benchmarks.paper.calibrate`): how strongly wheels err, as a factor on a
-fixed mixture of errors, and how strongly Wi-Fi does, in dB. The rest is chosen by hand and named here. A verdict that
-changes from one filling to another is a verdict about the filling.
+Two numbers of every filling are calibrated (`benchmarks.paper.fit_environments`): how strongly wheels err, as a factor
+on a fixed mixture of errors, and how strongly Wi-Fi does, in dB. The rest is chosen by hand and named here. A verdict
+that changes from one filling to another is a verdict about the filling.
 """
 
 from __future__ import annotations

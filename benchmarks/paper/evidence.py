@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.metrics.score import quantile
-from benchmarks.metrics.track import Floats
 from benchmarks.paper import summary
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.published import BISWAS_VELOSO, ODOMETRY, PROPOSED, TABLE_1, WIFI, ErrorRow
+from fusion.arrays import Floats
 
 LARGE_OUTLIER = 3.0
 """Times the median error of a run."""

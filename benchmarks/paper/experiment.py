@@ -10,17 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.metrics.bound import rssi_fix_bound
-from benchmarks.metrics.track import Floats
+from benchmarks.limits.fix_bound import rssi_fix_bound
 from benchmarks.paper.assumptions import ALTERNATIVES
-from benchmarks.paper.calibrate import SEEDS
-from benchmarks.paper.calibrated import calibrated_alternative
-from benchmarks.paper.moves import r_squared
+from benchmarks.paper.environment_files import calibrated_alternative
+from benchmarks.paper.fit_environments import SEEDS
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI, Environment
+from benchmarks.paper.straight_moves import r_squared
 from benchmarks.paper.trial import Trial, run_alternative, run_trial
-from benchmarks.progress import Progress
-from benchmarks.workers import Loss, compute
+from benchmarks.runner.workers import Loss, compute
 from fusion import FusionError, ParameterError
+from fusion.arrays import Floats
+from fusion.output.progress import Progress
 from sensors.simulation.scenario import Scenario, load_scenario
 
 

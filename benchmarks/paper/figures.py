@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.metrics.score import CHI_SQUARE_95, quantile
-from benchmarks.metrics.track import Floats
 from benchmarks.paper.experiment import Outcome
-from benchmarks.paper.moves import MOVES_M
+from benchmarks.paper.interpretations import ORIGINS_M, READINGS, SCALES
+from benchmarks.paper.outlier_rule_examples import REPAIRED, lock_out_example
 from benchmarks.paper.published import ODOMETRY, PROPOSED, WIFI
-from benchmarks.paper.readings import ORIGINS_M, READINGS, SCALES
+from benchmarks.paper.straight_moves import MOVES_M
 from benchmarks.paper.summary import Spread
 from benchmarks.paper.tables import CURVES, by_median
-from benchmarks.paper.weaknesses import REPAIRED, lock_out_example
-from benchmarks.plotting import label, panels, plain_colour, plain_ticks
+from fusion.arrays import Floats
+from fusion.output.figures import label, panels, plain_colour, plain_ticks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,17 +7,17 @@ from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 
-from benchmarks.output import write
-from benchmarks.page import as_html, inline_png
 from benchmarks.paper.assumptions import MAIN, PREMISE
 from benchmarks.paper.claims import in_words
 from benchmarks.paper.figures import FIGURES
+from benchmarks.paper.interpretations import literal
 from benchmarks.paper.published import EKF
-from benchmarks.paper.readings import literal
 from benchmarks.paper.report import Report
 from benchmarks.paper.tables import beating, filling_curves
-from benchmarks.plotting import as_png, require_matplotlib
-from benchmarks.sheet import as_markdown
+from fusion.output.figures import as_png, require_matplotlib
+from fusion.output.files import write
+from fusion.output.html import as_html, inline_png
+from fusion.output.tables import as_markdown
 
 PLACE = re.compile(r"\{\{(table|figure|text) (\w+)\}\}")
 

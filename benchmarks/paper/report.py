@@ -9,16 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 import fusion
-from benchmarks.metrics.track import Floats
 from benchmarks.paper import tables
+from benchmarks.paper.assumption_table import assumptions
 from benchmarks.paper.claims import Judged, judge
 from benchmarks.paper.experiment import Outcome
-from benchmarks.paper.inventory import assumptions
-from benchmarks.paper.readings import ORIGINS_M
-from benchmarks.paper.study import Ranked, effects, rank
+from benchmarks.paper.interpretation_study import Ranked, effects, rank
+from benchmarks.paper.interpretations import ORIGINS_M
+from benchmarks.paper.outlier_rule_examples import lock_out_example, origin_example
 from benchmarks.paper.summary import Spread
-from benchmarks.paper.weaknesses import lock_out_example, origin_example
-from benchmarks.sheet import Sheet
+from fusion.arrays import Floats
+from fusion.output.tables import Sheet
 
 
 class Report(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.metrics.score import quantile
-from benchmarks.metrics.track import Floats
+from fusion.arrays import Floats
 
 LEVEL = 0.90
 """Of all intervals."""

@@ -7,16 +7,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from benchmarks.metrics.track import Floats
 from benchmarks.paper.assumptions import ALTERNATIVES, MAIN
 from benchmarks.paper.claims import Judged
 from benchmarks.paper.experiment import Outcome
+from benchmarks.paper.interpretation_study import Effect, Ranked, literal_of_scale
+from benchmarks.paper.interpretations import ORIGINS_M, SCALES, literal
+from benchmarks.paper.outlier_rule_examples import Leg, Moved
 from benchmarks.paper.published import BISWAS_VELOSO, EKF, ODOMETRY, PROPOSED, TABLE_1, WIFI
-from benchmarks.paper.readings import ORIGINS_M, SCALES, literal
-from benchmarks.paper.study import Effect, Ranked, literal_of_scale
 from benchmarks.paper.summary import Share, Spread, beats_both
-from benchmarks.paper.weaknesses import Leg, Moved
-from benchmarks.sheet import Sheet
+from fusion.arrays import Floats
+from fusion.output.tables import Sheet
 
 CURVES = {ODOMETRY: "odometry", WIFI: "Wi-Fi", PROPOSED: "proposed"}
 """The paper's names."""

@@ -11,15 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fusion
-from benchmarks.lane import Lane, run_lane
-from benchmarks.metrics.instants import evaluation_instants, match
-from benchmarks.metrics.track import Floats, Track
-from benchmarks.paper.moves import measured_moves
+from benchmarks.metrics.estimate_track import Track
+from benchmarks.metrics.matching import match
+from benchmarks.paper.interpretations import MISSING_OPTION, MISSING_VALUES, ORIGINS_M, READINGS, SCALE_OPTION, SCALES
 from benchmarks.paper.published import EKF, ODOMETRY, PROPOSED, WIFI
-from benchmarks.paper.readings import MISSING_OPTION, MISSING_VALUES, ORIGINS_M, READINGS, SCALE_OPTION, SCALES
+from benchmarks.paper.straight_moves import measured_moves
 from benchmarks.paper.variants import leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
+from benchmarks.runner.estimator_run import Lane, run_lane
 from fusion import Decision, WifiScan
+from fusion.arrays import Floats
 from logs.run import Run
+from logs.truth import evaluation_instants
 from sensors.simulation.scenario import Scenario, load_scenario
 from sensors.simulation.simulate import simulated_run
 

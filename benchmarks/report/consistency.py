@@ -10,12 +10,12 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from benchmarks.metrics.innovations import NAMES, Banded
-from benchmarks.metrics.track import Floats
-from benchmarks.plotting import plain_colour
+from benchmarks.report.figure_panel import Panel, height_of
 from benchmarks.report.innovations import nis_of_cells
-from benchmarks.report.material import Material
-from benchmarks.report.panel import Panel, height_of
+from benchmarks.report.report_data import Material
 from benchmarks.runner.results import Result, by_contestant
+from fusion.arrays import Floats
+from fusion.output.figures import plain_colour
 
 BAND = ("anees", "anees_band_low", "anees_band_high")
 

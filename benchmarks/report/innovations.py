@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.metrics.innovations import NAMES, Banded, mean_nis
-from benchmarks.report.cells import link
-from benchmarks.report.material import Material
+from benchmarks.report.cell_links import link
+from benchmarks.report.report_data import Material
 from benchmarks.runner.results import by_contestant, median_metrics
-from benchmarks.sheet import Sheet
+from fusion.output.tables import Sheet
 
 
 def nis_of_cells(material: Material) -> dict[tuple[str, str], dict[str, Banded]]:

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from benchmarks.report.material import Material, Series, radio_of
-from benchmarks.report.panel import Panel, peaks
-from benchmarks.sites.placement import Grid, Readings, default_step, error_map
+from benchmarks.limits.anchor_placement import Grid, Readings, default_step, error_map
+from benchmarks.report.figure_panel import Panel, peaks
+from benchmarks.report.report_data import Material, Series, radio_of
 from fusion import Bounds
 from logs.run import Run
 

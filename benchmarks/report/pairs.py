@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.report.cells import link, nearest
-from benchmarks.report.material import Material
-from benchmarks.runner.compare_verb import sheet
+from benchmarks.report.cell_links import link, nearest
+from benchmarks.report.report_data import Material
+from benchmarks.runner.leaderboard import sheet
 from benchmarks.runner.results import Result, by_contestant, by_run, score_matrix
-from benchmarks.sheet import Sheet
-from benchmarks.statistics.statistics import log_ratios
+from benchmarks.statistics.paired_tests import log_ratios
 from benchmarks.statistics.verdict import Comparison, Verdict
+from fusion.output.tables import Sheet
 
 
 def run_by_run(material: Material) -> Sheet:

@@ -14,15 +14,15 @@ import numpy as np
 
 import fusion
 from benchmarks.metrics.score import quantile
-from benchmarks.metrics.track import Flags, Floats
-from benchmarks.plotting import plain_colour, plain_ticks
-from benchmarks.report.cells import link, nearest
-from benchmarks.report.material import Material
-from benchmarks.report.panel import Panel
-from benchmarks.runner.definition import CLEAN, TEST, TUNE, Contestant
+from benchmarks.report.cell_links import link, nearest
+from benchmarks.report.figure_panel import Panel
+from benchmarks.report.report_data import Material
 from benchmarks.runner.results import Result, by_run, score_matrix
-from benchmarks.sheet import Sheet
-from benchmarks.statistics.statistics import log_ratios, mean_interval
+from benchmarks.runner.suite import CLEAN, TEST, TUNE, Contestant
+from benchmarks.statistics.paired_tests import log_ratios, mean_interval
+from fusion.arrays import Flags, Floats
+from fusion.output.figures import plain_colour, plain_ticks
+from fusion.output.tables import Sheet
 from fusion.plugins import parameters
 
 WITHOUT_TUNE = (

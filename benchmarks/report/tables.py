@@ -8,19 +8,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.cell import ALIVE
-from benchmarks.metrics.bound import eff_crlb
+from benchmarks.limits.fix_bound import eff_crlb
+from benchmarks.limits.posterior_bound import eff_pcrlb, posterior_bound
+from benchmarks.metrics.catalogue import COLUMNS, Column, Unit, as_text
 from benchmarks.metrics.credibility import credibility_metrics
-from benchmarks.metrics.posterior import eff_pcrlb, posterior_bound
 from benchmarks.metrics.score import quantile
-from benchmarks.metrics.track import Floats
-from benchmarks.report.cells import link, link_all, nearest, nearest_to
-from benchmarks.report.material import Material
+from benchmarks.report.cell_links import link, link_all, nearest, nearest_to
+from benchmarks.report.report_data import Material
 from benchmarks.report.worst import command, worst_moments
-from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.results import Result, by_contestant, by_run, median_metrics, score_matrix
-from benchmarks.sheet import Sheet, as_code
-from benchmarks.statistics.statistics import mean_interval
-from benchmarks.table import COLUMNS, Column, Unit, as_text
+from benchmarks.runner.suite import CLEAN
+from benchmarks.statistics.paired_tests import mean_interval
+from fusion.arrays import Floats
+from fusion.output.tables import Sheet, as_code
 
 OUTAGE_COLUMNS = (
     Column("fault_availability", "available inside, %", 100.0, 1),

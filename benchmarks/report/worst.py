@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.review.invocation import review_command
-from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.results import Result, judged
+from benchmarks.runner.review_command import review_command
+from benchmarks.runner.suite import CLEAN
 
 
 def command(result: Result, suite: Sequence[str]) -> str:

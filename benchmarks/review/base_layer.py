@@ -6,17 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.colours import ANCHOR, TRUTH, WALL, anchor_colour
-from benchmarks.metrics.track import Floats, Stamps
-from benchmarks.review.canvas import Canvas, thinned
+from benchmarks.review.canvas import Canvas, draw_path, thinned
 from benchmarks.review.cdf import LEAST_M, CdfAxes, draw_axes, round_step
-from benchmarks.review.device_events import draw_device_events, worth_a_line
 from benchmarks.review.frame import MARGIN, Frame
-from benchmarks.review.heard import Heard
-from benchmarks.review.paths import draw_path
-from benchmarks.review.raw_sensors import draw_raw_sensors, raw_series
+from benchmarks.review.radio_circles import Heard
+from benchmarks.review.raw_sensors import draw_device_events, draw_raw_sensors, raw_series, worth_a_line
 from fusion import World
-from logs.run import Run, TruthTrack
+from fusion.arrays import Floats, Stamps
+from fusion.output.colours import ANCHOR, TRUTH, WALL, anchor_colour
+from logs.run import Run
+from logs.truth import TruthTrack
 
 ARROW_M = 0.75
 """Length of the arrow that shows the true heading."""

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.metrics.score import quantile
-from benchmarks.review.device_events import DEVICES, worth_a_line
 from benchmarks.review.drawing import SHOWN, Drawing
 from benchmarks.review.estimator_plots import AXES
 from benchmarks.review.events import State
 from benchmarks.review.frame import TIMELINE, Frame
-from benchmarks.review.raw_sensors import SPEED, TURN_RATE
+from benchmarks.review.raw_sensors import DEVICES, SPEED, TURN_RATE, worth_a_line
 from benchmarks.review.views import (
     cdf_view,
     event_view,

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.colours import TRUTH, WALL
 from benchmarks.metrics.score import quantile
-from benchmarks.metrics.track import Floats
 from benchmarks.review.canvas import STRONG, Canvas
 from benchmarks.review.drawing import Drawing
+from fusion.arrays import Floats
+from fusion.output.colours import TRUTH, WALL
 
 WIDTH = 1.6
 """The picture is this wide and 1 high, for a 2D view keeps proportions."""

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.metrics.fates import field
-from benchmarks.metrics.track import Flags, Floats, Stamps, Whole
 from benchmarks.review.canvas import thinned
 from fusion import Update
+from fusion.arrays import Flags, Floats, Stamps, Whole
 
 
 class EstimateColumns(NamedTuple):

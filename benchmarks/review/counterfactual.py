@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from benchmarks.lane import Lane, run_lane
 from benchmarks.review.frame import Frame
+from benchmarks.runner.estimator_run import Lane, run_lane
 from fusion import Measurement, ParameterError, Ranges, WifiScan
 from fusion.errors import did_you_mean
 from fusion.values import nanoseconds, seconds

@@ -10,17 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.cell import Score
-from benchmarks.colours import Colour, colour_of
-from benchmarks.lane import Lane
-from benchmarks.metrics.course import Instants
 from benchmarks.metrics.fates import FateColumns, fates_per_update
-from benchmarks.metrics.instants import Answers, evaluation_instants, match, wrap_angles
-from benchmarks.metrics.track import Floats, Whole
+from benchmarks.metrics.matching import Answers, match
 from benchmarks.review.columns import DrawnTrack, EstimateColumns
 from benchmarks.review.events import Events, States, events, states
-from benchmarks.table import ranked
+from benchmarks.runner.estimator_run import Lane
+from benchmarks.runner.leaderboard import ranked
 from fusion import Decision, Reason
+from fusion.arrays import Floats, Whole
+from fusion.output.colours import Colour, colour_of
 from logs.run import Run
+from logs.truth import Instants, evaluation_instants, wrap_angles
 
 SHOWN = 6
 """Tracks that are switched on, the best ones: more cannot be told apart. The eye beside an entity shows the others."""

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.colours import ANCHOR, REFUSED
 from benchmarks.metrics.fates import Codes, fates_of
 from benchmarks.metrics.score import CHI_SQUARE_95
-from benchmarks.metrics.track import Flags, Floats, Stamps, Whole
-from benchmarks.review.canvas import STRONG, Canvas, Place, thinned
+from benchmarks.review.canvas import STRONG, Canvas, Place, draw_path, thinned
 from benchmarks.review.drawing import Drawing
-from benchmarks.review.heard import Heard
-from benchmarks.review.paths import draw_path
+from benchmarks.review.radio_circles import Heard
 from fusion import Reason, World
+from fusion.arrays import Flags, Floats, Stamps, Whole
+from fusion.output.colours import ANCHOR, REFUSED
 from fusion.values import nanoseconds
 
 CIRCLE_OPACITY = 130

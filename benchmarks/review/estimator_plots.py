@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.colours import LOST, REFUSED, TAKEN, TRUTH, UNSURE, anchor_colour
-from benchmarks.metrics.track import Floats, Stamps
 from benchmarks.review.canvas import Canvas
 from benchmarks.review.drawing import Drawing
 from benchmarks.review.events import State
 from benchmarks.review.frame import Frame
 from fusion import Reason, World
+from fusion.arrays import Floats, Stamps
+from fusion.output.colours import LOST, REFUSED, TAKEN, TRUTH, UNSURE, anchor_colour
 
 NIS_LIMIT = 3.841458820694124
 """What the NIS of one scalar reading exceeds once in twenty, if the filter is honest (chi-square, one degree)."""

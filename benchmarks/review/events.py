@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.metrics.fates import DECISIONS, REASONS, FateColumns
-from benchmarks.metrics.track import Stamps, Whole
 from benchmarks.review.columns import EstimateColumns
 from fusion import Decision, Reason, Update
+from fusion.arrays import Stamps, Whole
 
 LOST_PROBABILITY = 0.5
 """An estimator that is more likely lost than not, is."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from benchmarks.bench import Settings
 from benchmarks.cell import Cell, Score, score_lane
-from benchmarks.clouds import CloudWatch
-from benchmarks.lane import Lane, run_lane
 from benchmarks.review.counterfactual import Counterfactual, ghost_lane
+from benchmarks.review.particle_clouds import CloudWatch
+from benchmarks.runner.estimator_run import Lane, run_lane
+from fusion.cli.options import Settings
 from logs.run import Run
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from benchmarks.bench import Settings
-from benchmarks.review.invocation import review_command
+from benchmarks.review.error_causes import Growth
 from benchmarks.review.moments import JUST_BEFORE_S, Moment
-from benchmarks.review.pulls import Growth
+from benchmarks.runner.review_command import review_command
+from fusion.cli.options import Settings
 
 
 def told(moments: Sequence[Moment], run: Sequence[str], settings: Settings, seed: int) -> list[str]:

@@ -11,13 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.metrics.fates import REASONS, FateColumns
-from benchmarks.metrics.instants import MAX_AGE_S
-from benchmarks.metrics.peaks import peaks
-from benchmarks.metrics.track import Flags
+from benchmarks.metrics.matching import MAX_AGE_S
 from benchmarks.review.drawing import Drawing
+from benchmarks.review.error_causes import MISLEADING, Growth, growth, misreadings
 from benchmarks.review.events import OWN_REFUSALS
-from benchmarks.review.pulls import MISLEADING, Growth, growth, misreadings
 from fusion import Decision, Odometry, Reason, Update, WheelTicks
+from fusion.arrays import Flags, Floats, Stamps
 from fusion.values import nanoseconds, seconds
 from logs.run import Run
 
@@ -182,3 +181,27 @@ def _of_motion(run: Run, at_ns: int) -> Iterator[str]:
 def _length(duration_ns: int) -> str:
     duration_s = seconds(duration_ns)
     return f"{duration_s:.0f} s" if duration_s >= 10.0 else f"{math.floor(10.0 * duration_s) / 10.0:g} s"
+
+
+SPACING_S = 5.0
+"""Moments closer together are one."""
+
+
+def peaks(time_ns: Stamps, values: Floats, count: int) -> list[int]:
+    """Indices of the ``count`` largest local maxima at least `SPACING_S` apart, the largest first, of equal ones the
+    earliest; a plateau counts as its first row.
+    """
+    if len(values) == 0:
+        return []
+    starts = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
+    level = values[starts]
+    above_left = np.concatenate([[True], level[1:] > level[:-1]])
+    above_right = np.concatenate([level[:-1] > level[1:], [True]])
+    chosen: list[int] = []
+    candidates = starts[above_left & above_right]
+    for place in candidates[np.argsort(-values[candidates], kind="stable")].tolist():
+        if all(abs(int(time_ns[place]) - int(time_ns[other])) >= nanoseconds(SPACING_S) for other in chosen):
+            chosen.append(place)
+        if len(chosen) == count:
+            break
+    return chosen

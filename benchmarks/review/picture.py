@@ -8,10 +8,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from benchmarks.output import require_place, write
 from benchmarks.review.session import Session
 from benchmarks.review.viewer import require_rerun, start
 from fusion import ViewerError
+from fusion.output.files import require_place, write
 
 SIZE = (1800, 1100)
 """Width and height of the picture [pixels]."""

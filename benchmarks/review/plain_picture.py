@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.cell import Score
-from benchmarks.colours import ANCHOR, GROUND, TRUTH, WALL
-from benchmarks.lane import Lane
-from benchmarks.output import write
-from benchmarks.plotting import PANEL_INCHES, as_png, plain, require_matplotlib
+from benchmarks.metrics.catalogue import unit_of
+from benchmarks.review.canvas import mostly_jumps
 from benchmarks.review.cdf import LEAST_M
 from benchmarks.review.drawing import Drawing, drawings
 from benchmarks.review.frame import MARGIN, Frame
-from benchmarks.review.paths import mostly_jumps
-from benchmarks.table import unit_of
+from benchmarks.runner.estimator_run import Lane
+from fusion.output.colours import ANCHOR, GROUND, TRUTH, WALL
+from fusion.output.figures import PANEL_INCHES, as_png, plain, require_matplotlib
+from fusion.output.files import write
 from fusion.values import NANOSECONDS
 from logs.run import Run
 

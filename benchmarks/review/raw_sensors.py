@@ -8,11 +8,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from benchmarks.colours import PALETTE
-from benchmarks.metrics.track import Floats, Stamps
 from benchmarks.review.canvas import Canvas
-from fusion import Gyro, Measurement, MotorCommand, Odometry, WheelTicks, World
+from fusion import Gyro, Level, Measurement, MotorCommand, Odometry, Remark, WheelTicks, World
+from fusion.arrays import Floats, Stamps
+from fusion.output.colours import PALETTE
 from fusion.values import NANOSECONDS
+from logs.devices import OPENED, STATUS, as_line
+from logs.run import Run
 
 SPEED, TURN_RATE = "speed", "turn_rate"
 """The two plots: [m/s] and [deg/s]."""
@@ -74,3 +76,20 @@ def _odometry_rates(sensor: str, steps: Sequence[Odometry]) -> Series:
     time_ns, distance_m = _stamps(taken), np.array([step.distance_m for step in taken], dtype=np.float64)
     turn_deg = np.degrees(np.array([step.turn_rad for step in taken], dtype=np.float64))
     return {(SPEED, sensor): (time_ns, distance_m / span_s), (TURN_RATE, sensor): (time_ns, turn_deg / span_s)}
+
+
+DEVICES = "devices"
+LEVELS = {Level.OK: "INFO", Level.WARN: "WARN", Level.ERROR: "ERROR"}
+
+
+def worth_a_line(run: Run) -> Sequence[Remark]:
+    """Remarks that are no routine: what is told each second, or beside each scan, is left out."""
+    return [r for r in run.remarks if r.text == OPENED or (r.level is not Level.OK and r.text != STATUS)]
+
+
+def draw_device_events(canvas: Canvas, remarks: Sequence[Remark]) -> None:
+    """A line for each; nothing for a run without."""
+    if remarks:
+        time_ns = np.array([remark.time_ns for remark in remarks], dtype=np.int64)
+        levels = [LEVELS[remark.level] for remark in remarks]
+        canvas.text(["events", DEVICES], time_ns, levels, [as_line(remark) for remark in remarks])

@@ -13,8 +13,7 @@ from typing import Any
 from urllib.parse import quote
 
 from benchmarks.cell import Score
-from benchmarks.lane import Lane
-from benchmarks.output import require_place, write
+from benchmarks.metrics.catalogue import COLUMNS, Column, as_text
 from benchmarks.review.base_layer import draw_base, properties
 from benchmarks.review.blueprint import blueprint
 from benchmarks.review.canvas import Canvas
@@ -23,11 +22,13 @@ from benchmarks.review.drawing import Drawing, drawings
 from benchmarks.review.estimator_layer import draw_on_map, thickness
 from benchmarks.review.estimator_plots import draw_over_time
 from benchmarks.review.frame import Frame
-from benchmarks.review.heard import heard
 from benchmarks.review.listing import line
 from benchmarks.review.moments import worst_moments
+from benchmarks.review.radio_circles import heard
 from benchmarks.review.viewer import require_rerun
-from benchmarks.table import COLUMNS, Column, as_text, ranked
+from benchmarks.runner.estimator_run import Lane
+from benchmarks.runner.leaderboard import ranked
+from fusion.output.files import require_place, write
 from logs.run import Run
 
 AGES = (Column("age_p95", "age", 1.0, 2), Column("dropouts", "gaps", 1.0, 0))

@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from benchmarks.colours import GROUND
 from benchmarks.review.cdf import WIDTH
 from benchmarks.review.drawing import Drawing
 from benchmarks.review.frame import LEGEND, MARGIN, TIMELINE, Frame
+from fusion.output.colours import GROUND
 from logs.run import Run
 
 TRAIL_S = 10.0

@@ -10,20 +10,20 @@ from typing import Any, NamedTuple
 from zipfile import BadZipFile
 
 from benchmarks.cell import ALIVE, Outcome, outcome_of
-from benchmarks.faults.faults import apply_faults
-from benchmarks.lane import Lane, run_lane
-from benchmarks.metrics.archive import from_bytes, to_bytes
+from benchmarks.faults.inject import apply_faults
+from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.innovations import innovation_metrics
-from benchmarks.metrics.track import Track
 from benchmarks.review.frame import Frame
-from benchmarks.runner.definition import CLEAN
+from benchmarks.runner.archive import from_bytes, to_bytes
+from benchmarks.runner.estimator_run import Lane, run_lane
 from benchmarks.runner.judge import judge, metrics_if_lost
 from benchmarks.runner.plan import Cell, has_estimate, read_faults
 from benchmarks.runner.reference import reference_of
-from benchmarks.runner.source import open_run
+from benchmarks.runner.run_source import open_run
 from benchmarks.runner.store import Store, to_json
-from benchmarks.workers import Limits, Loss, compute
+from benchmarks.runner.suite import CLEAN
+from benchmarks.runner.workers import Limits, Loss, compute
 from logs.run import Run
 
 LOST = {

@@ -6,15 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.faults.faults import outages
-from benchmarks.metrics.dynamics import fault_metrics
-from benchmarks.metrics.instants import match
-from benchmarks.metrics.interpolation import meet
+from benchmarks.faults.inject import outages
+from benchmarks.metrics.convergence import fault_metrics
+from benchmarks.metrics.estimate_track import Track
+from benchmarks.metrics.matching import match, meet
 from benchmarks.metrics.score import Errors, errors, metrics, metrics_of_lost, unanswered
-from benchmarks.metrics.track import Track
-from benchmarks.runner.definition import CLEAN
 from benchmarks.runner.plan import Cell, read_faults
 from benchmarks.runner.reference import Reference
+from benchmarks.runner.suite import CLEAN
 from fusion.values import seconds
 
 

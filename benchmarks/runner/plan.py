@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 import fusion
-from benchmarks.faults.fault_kind import Fault
-from benchmarks.faults.faults import read_fault
-from benchmarks.metrics.archive import ARCHIVE_VERSION
+from benchmarks.faults.fault import Fault
+from benchmarks.faults.inject import read_fault
 from benchmarks.metrics.score import METRICS_VERSION
-from benchmarks.runner.definition import CLEAN, CellLimits, Contestant, Evaluation, FaultSet, RunSource, Suite
-from benchmarks.runner.source import Content, content_of, fingerprint
+from benchmarks.runner.archive import ARCHIVE_VERSION
+from benchmarks.runner.run_source import Content, content_of, fingerprint
 from benchmarks.runner.store import Store, key_of
+from benchmarks.runner.suite import CLEAN, CellLimits, Contestant, Evaluation, FaultSet, RunSource, Suite
 from fusion import SuiteError
 from fusion.errors import did_you_mean
 from fusion.plugins import parameters

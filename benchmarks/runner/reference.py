@@ -10,13 +10,12 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from benchmarks.metrics.course import Instants
-from benchmarks.metrics.instants import evaluation_instants
-from benchmarks.prior import begin_ns
 from benchmarks.runner.plan import Cell
-from benchmarks.runner.source import KEPT_RUNS, open_run
+from benchmarks.runner.run_source import KEPT_RUNS, open_run
 from benchmarks.runner.store import Store, key_of, to_json
-from logs.run import Run, TruthTrack
+from logs.prior import begin_ns
+from logs.run import Run
+from logs.truth import Instants, TruthTrack, evaluation_instants
 
 KIND = "references"
 

@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
+import argparse
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
-from benchmarks.cell import ALIVE
+from benchmarks.cli.bench_plan import opened
+from benchmarks.metrics.catalogue import RANKED_BY
 from benchmarks.metrics.score import METRICS_VERSION, quantile
-from benchmarks.metrics.track import Floats
-from benchmarks.runner.definition import CLEAN, TEST, Suite
 from benchmarks.runner.execute import read_metrics
-from benchmarks.runner.plan import Cell
+from benchmarks.runner.plan import Cell, cells_of
 from benchmarks.runner.store import Store
-from benchmarks.sheet import Sheet
+from benchmarks.runner.suite import CLEAN, TEST, Suite
 from benchmarks.statistics.verdict import Comparison, compare
-from benchmarks.table import COLUMNS, as_text
-from fusion import ParameterError
+from fusion import ParameterError, SuiteError
+from fusion.arrays import Floats
 from fusion.errors import did_you_mean
-
-RANKED_BY = "pos_p75"
-MORE_IS_BETTER = re.compile(
-    r"n|n_valid|head_n|.*n_eff|.*availability|cover.*|pos_auc|pos_cdf_.*|t_conv_share|nis95_.*|white_.*|rpe_.*_n"
-)
-NEITHER_IS_BETTER = re.compile(r"anees.*|nll_.*|.*bias.*|cov_.*|path_ratio|eag|.*growth")
-"""Their best is 1 or 0, or they may be negative and so have no ratio."""
 
 
 class Result(NamedTuple):
@@ -70,14 +62,6 @@ def require_metric(metric: str, results: Sequence[Result]) -> None:
         raise ParameterError(f"the suite has no metric {metric!r}; {did_you_mean(metric, sorted(known))}")
 
 
-def require_lower_is_better(metric: str) -> None:
-    """Raises `ParameterError` for a metric of which more is better, or a certain value: that the lower wins would be
-    the wrong verdict.
-    """
-    if MORE_IS_BETTER.fullmatch(metric) or NEITHER_IS_BETTER.fullmatch(metric):
-        raise ParameterError(f"a lower {metric} is not better, so it decides nothing here; {RANKED_BY} is usual")
-
-
 def judged(results: Sequence[Result]) -> list[Result]:
     """The results that count: those of the test runs with ground truth; where there is none such, of the test runs, or
     of all.
@@ -112,18 +96,6 @@ def median_metrics(results: Sequence[Result]) -> dict[str, float]:
     return {name: quantile(column[~np.isnan(column)], 0.5) for name, column in columns.items()}
 
 
-def leaderboard(results: Sequence[Result], fault: str = CLEAN) -> Sheet:
-    """The contestants, the best first: by how many cells were lost, then by the median of the ranking metric."""
-    shown = [column for column in COLUMNS if column.key != "cpu_per_measurement_s"]
-    rows = []
-    for name, own in by_contestant(results, fault).items():
-        lost, medians = sum(result.status not in ALIVE for result in own), median_metrics(own)
-        numbers = (as_text(column, medians) for column in shown)
-        rows.append(((lost, medians.get(RANKED_BY, math.inf), name), (name, f"{len(own) - lost}/{len(own)}", *numbers)))
-    head = ("position error of", "cells ok", *(column.title for column in shown))
-    return Sheet(f"{fault}: medians over cells", head, tuple(row for _, row in sorted(rows)))
-
-
 def score_matrix(results: Sequence[Result], metric: str) -> Floats:
     """One contestant's scores under one fault, (runs, seeds), both in the suite's order."""
     rows = [[result.metrics.get(metric, math.inf) for result in own] for own in by_run(results).values()]
@@ -150,3 +122,22 @@ def flat(result: Result) -> dict[str, object]:
     keys = {"estimate_key": cell.estimate_key, "score_key": cell.score_key}
     numbers = {key: value if math.isfinite(value) else None for key, value in result.metrics.items()}
     return {**head, **tail, **numbers, **keys}
+
+
+NOT_MEASURED = 3
+"""Exit code of a verb that found nothing to judge."""
+
+
+def stored_results(arguments: argparse.Namespace) -> tuple[Suite, list[Result]]:
+    """The suite and its results; raises `SuiteError` while some are missing."""
+    suite, store = opened(arguments)
+    cells = cells_of(suite, store)
+    results = read_results(cells, store)
+    if len(results) < len(cells):
+        refuse_incomplete(suite, len(results), len(cells))
+    return suite, results
+
+
+def refuse_incomplete(suite: Suite, there: int, wanted: int) -> NoReturn:
+    """A part of a suite is not its result."""
+    raise SuiteError(f"{suite.name}: {there} of {wanted} cells are there; run `fusion bench run` first")

@@ -98,3 +98,6 @@ def to_json(value: object) -> bytes:
     """Strict JSON, one line a key, the same bytes for the same value."""
     # An indent would do that too, but by the encoder that is written in Python, and ten times slower.
     return (json.dumps(value, sort_keys=True, separators=(",\n", ": "), allow_nan=False) + "\n").encode()
+
+
+STORE = Path("fusion-bench")

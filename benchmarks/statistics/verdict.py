@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.statistics.letters import letters
-from benchmarks.statistics.statistics import (
+from benchmarks.statistics.paired_tests import (
     LEVEL,
     MAX_RUNS,
     Floats,

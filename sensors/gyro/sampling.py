@@ -1,7 +1,7 @@
 """What gyros that are asked for each sample have in common: a pace, an axis, a stamp in the middle of the reading.
 
 Samples are due at whole periods from the opening on. A program that is held up skips what it missed and says how many,
-instead of reading the past in a hurry. The bias is never taken off: `sensors.onboard.standstill` measures it.
+instead of reading the past in a hurry. The bias is never taken off: `sensors.onboard.gyro_bias` measures it.
 """
 
 from __future__ import annotations

@@ -32,11 +32,11 @@ from fusion import (
     build,
 )
 from fusion.values import seconds
-from sensors.onboard.keeper import Received
-from sensors.onboard.live_lane import Lane
-from sensors.onboard.recording import Answers, Recorder, check_policy
+from sensors.onboard.driver_lifecycle import Received
+from sensors.onboard.guarded_tracker import Lane
+from sensors.onboard.recorder import Answers, Recorder, check_policy
 from sensors.onboard.robot_file import RobotFile
-from sensors.onboard.sensing import PATIENCE_S, Sensing, Turn, check_duration
+from sensors.onboard.sensor_loop import PATIENCE_S, Sensing, Turn, check_duration
 from sensors.onboard.supervisor import Status
 
 FASTEST_HZ = 1000.0

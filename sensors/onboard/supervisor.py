@@ -15,7 +15,7 @@ from typing import NamedTuple
 from fusion.driver import Clock, Remark, Said
 from fusion.errors import DeviceLostError, NotFoundError, did_you_mean
 from fusion.values import nanoseconds, seconds
-from sensors.onboard.keeper import Keeper, Received, State
+from sensors.onboard.driver_lifecycle import Keeper, Received, State
 
 CAPACITY = 4096
 """Messages a queue holds: twenty seconds of a gyro at 200 Hz."""

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
 from pathlib import Path
 
 from fusion import ParameterError, Truth
 from fusion.values import nanoseconds
-from logs.run import Run, TruthTrack
+from logs.run import Run
+from logs.truth import TruthTrack
 from sensors.simulation.robot import SimulatedRobot
-from sensors.simulation.scenario import Scenario, builtin_names, load_scenario
+from sensors.simulation.scenario import Scenario, load_scenario
 
 
 def simulate(scenario: str | Path, output: Path, *, seed: int = 0, duration_s: float | None = None) -> Path:
@@ -59,19 +58,3 @@ def simulated_run(scenario: Scenario, seed: int) -> Run:
 
 def _about(scenario: Scenario, seed: int) -> dict[str, str]:
     return {"source": "simulated", "scenario": scenario.name, "seed": str(seed)}
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Arguments of `fusion simulate`."""
-    names = ", ".join(builtin_names())
-    parser.add_argument("scenario", metavar="SCENARIO", help=f"one of {names}, or a scenario file (*.toml)")
-    parser.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="the log to write (*.mcap)")
-    parser.add_argument("--seed", type=int, default=0, help="another seed, another run (default 0)")
-    parser.add_argument("--duration", metavar="S", type=float, help="stop after this many seconds")
-
-
-def run(arguments: argparse.Namespace) -> int:
-    """Simulate and name the log."""
-    path = simulate(arguments.scenario, arguments.output, seed=arguments.seed, duration_s=arguments.duration)
-    sys.stdout.write(f"{path}\n")
-    return 0

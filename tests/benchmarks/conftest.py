@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.metrics.course import Instants
-from benchmarks.metrics.instants import Answers, wrap_angles
+from benchmarks.metrics.matching import Answers
+from logs.truth import Instants, wrap_angles
 
 
 def _answers_of(x, y, heading, covariance=None, valid=None):

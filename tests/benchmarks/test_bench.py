@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 import fusion
-from benchmarks.bench import bench, parse_settings, pooled, remarks, write_records
 from benchmarks.cell import Cell, Score, score_lane
-from benchmarks.lane import run_lane
-from benchmarks.prior import starting_prior
-from benchmarks.table import print_tables, ranked
+from benchmarks.runner.adhoc_suite import bench, pooled, remarks, write_records
+from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.leaderboard import print_tables, ranked
 from fusion import (
     Covariance,
     Decision,
@@ -31,9 +30,12 @@ from fusion import (
     Reason,
     Truth,
 )
-from fusion.cli import main
+from fusion.cli.main import main
+from fusion.cli.options import parse_settings
 from fusion.timeline import order
-from logs.run import Run, TruthTrack
+from logs.prior import starting_prior
+from logs.run import Run
+from logs.truth import TruthTrack
 from logs.writer import RunWriter
 from tests.fusion.streams import WORLD as ANCHORED
 from tests.fusion.streams import CountingWorld, ranges

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.clouds import MOST_CLOUDS, MOST_POINTS, CloudWatch, thinned
-from benchmarks.lane import run_lane
+from benchmarks.review.particle_clouds import MOST_CLOUDS, MOST_POINTS, CloudWatch, thinned
+from benchmarks.runner.estimator_run import run_lane
 from fusion import Increment, Moment, Particles, Ranges, WifiScan
 from logs.reader import read_run
 from sensors.simulation.simulate import simulate

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 import fusion
-from benchmarks import demo as module
-from benchmarks.demo import demo, next_commands, program
-from benchmarks.runner.definition import load_suite
+from benchmarks.cli import demo as module
+from benchmarks.cli.demo import demo, next_commands, program
+from benchmarks.runner.suite import load_suite
 from fusion import ViewerError
 from logs.reader import read_run
 
@@ -58,7 +58,7 @@ def test_command_prints_the_table_the_files_and_three_commands_that_run_as_print
     monkeypatch.setenv("PATH", os.defpath)
     short = {"duration_s": 6.0, "suite": small(tmp_path), "workers": 1}
     monkeypatch.setattr(module, "demo", lambda folder, *, seed: demo(folder, seed=seed, **short))
-    from fusion.cli import main
+    from fusion.cli.main import main
 
     assert main(["demo", "-o", "my demo"]) == 0
     printed = capsys.readouterr().out

@@ -8,13 +8,13 @@ import pytest
 from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.innovations import mean_nis
 from benchmarks.report.innovations import innovations
-from benchmarks.report.material import Material
-from benchmarks.report.verb import report
-from benchmarks.runner.definition import load_suite
+from benchmarks.report.report import report
+from benchmarks.report.report_data import Material
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results
-from benchmarks.runner.run_verb import run_suite
+from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
+from benchmarks.runner.suite import load_suite
 
 WIFI, RANGES = 0, 1
 N = 4000

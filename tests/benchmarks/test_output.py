@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.output import write
 from fusion import FusionError
+from fusion.output.files import write
 
 
 @contextmanager

@@ -3,8 +3,8 @@
 import pytest
 
 import fusion
-from benchmarks.bench import bench
-from benchmarks.replay import replay
+from benchmarks.cli.replay import replay
+from benchmarks.runner.adhoc_suite import bench
 from fusion import (
     Covariance,
     Estimate,

@@ -9,22 +9,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.metrics.bound import rssi_fix_bound
-from benchmarks.page import as_html
-from benchmarks.report.cells import SCRIPT
-from benchmarks.report.figures import FIGURES, cost
-from benchmarks.report.material import Material
+from benchmarks.limits.fix_bound import rssi_fix_bound
+from benchmarks.report.accuracy_figures import cost
+from benchmarks.report.cell_links import SCRIPT
+from benchmarks.report.report import FIGURES, as_page, report
+from benchmarks.report.report_data import Material
 from benchmarks.report.sensitivity import WITHOUT_TUNE
 from benchmarks.report.tables import credibility, faults, fixes, outages
-from benchmarks.report.verb import as_page, report
 from benchmarks.report.worst import command, worst_moments
 from benchmarks.review.review import review
-from benchmarks.runner.definition import load_suite
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import by_contestant, read_results
-from benchmarks.runner.run_verb import run_suite
+from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from fusion.cli import main
+from benchmarks.runner.suite import load_suite
+from fusion.cli.main import main
+from fusion.output.html import as_html
 from logs.reader import read_run
 from logs.writer import RunWriter
 from sensors.simulation.simulate import simulate

@@ -11,18 +11,18 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from benchmarks.plotting import as_png, plain_colour
+from benchmarks.report.accuracy_figures import LEADING, accuracy, over_time
 from benchmarks.report.consistency import consistency
-from benchmarks.report.figures import FIGURES, LEADING, accuracy, over_time
 from benchmarks.report.innovations import innovations
 from benchmarks.report.maps import maps
-from benchmarks.report.material import Material
+from benchmarks.report.report import FIGURES, as_page
+from benchmarks.report.report_data import Material
 from benchmarks.report.sensitivity import curves, sweeps
-from benchmarks.report.verb import as_page
-from benchmarks.runner.definition import load_suite
-from benchmarks.runner.run_verb import run_suite
+from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from fusion.cli import main
+from benchmarks.runner.suite import load_suite
+from fusion.cli.main import main
+from fusion.output.figures import as_png, plain_colour
 from tests.benchmarks.browser import CHROMIUM, chromium
 
 SUITE = """

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fusion import Truth
-from fusion.cli import main
-from fusion.drive import Drive
+from fusion.cli.main import main
+from fusion.conformance.synthetic_run import Drive
 from fusion.values import NANOSECONDS
-from logs.export import export_csv
+from logs.cli.export import export_csv
 from logs.reader import read_run
 from logs.writer import RunWriter
 

@@ -12,8 +12,8 @@ from functools import partial
 
 import pytest
 
-from benchmarks.worker_process import peak_rss_bytes
-from benchmarks.workers import Crew, Limits, Loss, compute
+from benchmarks.runner.worker_process import peak_rss_bytes
+from benchmarks.runner.workers import Crew, Limits, Loss, compute
 
 POWERS = [partial(pow, 2, k) for k in range(6)]
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from fusion.cli import main
-from fusion.conformance import Outcome
+from fusion.cli.main import main
+from fusion.conformance.checks import Outcome
+from fusion.conformance.driver_promises import DRIVER_PROMISES, driver_verdict
 from fusion.driver import DeviceInfo, DriverSpec
-from fusion.driver_kit import DRIVER_PROMISES, driver_verdict
 from fusion.errors import DeviceLostError, NotPermittedError
 from fusion.values import WheelTicks
 from sensors.simulation.drivers import SimulatedEncoders as Good

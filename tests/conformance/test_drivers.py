@@ -3,8 +3,8 @@
 import pytest
 
 import fusion
-from fusion.conformance import Outcome
-from fusion.driver_kit import DRIVER_PROMISES, driver_verdict
+from fusion.conformance.checks import Outcome
+from fusion.conformance.driver_promises import DRIVER_PROMISES, driver_verdict
 from fusion.plugins import SENSORS
 
 

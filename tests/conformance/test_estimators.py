@@ -3,7 +3,7 @@
 import pytest
 
 import fusion
-from fusion.conformance import checks
+from fusion.conformance.checks import checks
 
 EXCUSED = {
     (

@@ -26,9 +26,9 @@ from fusion import (
     wrap_angle,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.check import run as run_check
-from fusion.conformance import Outcome, checks, run_checks
-from fusion.promises import PROMISES
+from fusion.cli.check import run as run_check
+from fusion.conformance.checks import Outcome, checks, run_checks
+from fusion.conformance.estimator_promises import PROMISES
 
 
 class State(NamedTuple):

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.runner.definition import load_suite
+from benchmarks.runner.suite import load_suite
 from fusion import World
-from fusion.cli import VERBS
+from fusion.cli.main import VERBS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fusion.conformance import Outcome, run_checks
+from fusion.conformance.checks import Outcome, run_checks
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

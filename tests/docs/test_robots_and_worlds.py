@@ -9,16 +9,16 @@ from pathlib import Path
 import pytest
 
 import fusion
-from benchmarks.bench import bench
 from benchmarks.cell import Cell, score_lane
-from benchmarks.lane import run_lane
+from benchmarks.runner.adhoc_suite import bench
+from benchmarks.runner.estimator_run import run_lane
 from fusion import Truth, World
 from fusion.driver import Remark
 from fusion.plugins import SENSORS
 from logs.reader import read_run
-from sensors.onboard import doctor
+from sensors.cli import doctor
 from sensors.onboard.robot_file import RobotFile, Sensor, build_driver
-from sensors.onboard.sensing import Sensing
+from sensors.onboard.sensor_loop import Sensing
 from sensors.simulation.scenario import Scenario
 from sensors.simulation.simulate import simulated_run
 from tests.sensors.virtual_drive import virtual_drive

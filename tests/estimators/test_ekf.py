@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from estimators.ekf import Ekf, chi_square_gate
+from estimators.ekf import Ekf
 from fusion import (
     Covariance,
     Decision,
@@ -22,6 +22,7 @@ from fusion import (
     track,
     wrap_angle,
 )
+from fusion.fates import chi_square_gate
 
 SECOND = 1_000_000_000
 PLAIN_NOISE = {"distance_scale_std": 0.0, "turn_scale_std": 0.0, "turn_bias_std_rad_s": 0.0}

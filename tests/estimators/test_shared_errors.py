@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.lane import run_lane
-from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors, metrics
-from estimators.sampling import repeated_variance, total_variance
+from benchmarks.runner.estimator_run import run_lane
 from fusion import (
     Covariance,
     Odometry,
@@ -27,7 +26,9 @@ from fusion import (
     sightings,
     track,
 )
+from fusion.correlated_error import repeated_variance, total_variance
 from fusion.values import NANOSECONDS as SECOND
+from logs.truth import evaluation_instants
 from sensors.simulation.scenario import load_scenario
 from sensors.simulation.simulate import simulated_run
 

@@ -27,7 +27,7 @@ from fusion import (
     names,
     track,
 )
-from fusion.drive import Drive
+from fusion.conformance.synthetic_run import Drive
 
 ANCHORS = [{"id": "a", "position_m": [0, 0]}, {"id": "b", "position_m": [5, 0]}, {"id": "c", "position_m": [0, 5]}]
 BOUNDS = "[bounds]\nx_min = 0\nx_max = 1\ny_min = 0\ny_max = 1\n"

@@ -43,8 +43,8 @@ from fusion import (
     track,
     wrap_angle,
 )
-from fusion.cli import main
-from fusion.drive import Drive
+from fusion.cli.main import main
+from fusion.conformance.synthetic_run import Drive
 from fusion.odometry import Odometer, wheel_increment
 from fusion.radio import PathLoss, Ranging, free_space_loss_db
 from fusion.trilateration import closed_form, least_squares, trilaterate

@@ -27,7 +27,7 @@ from fusion.certificate import Certificate
 from fusion.epochs import LONGEST
 from fusion.fold import Fold
 from fusion.timeline import Timeline, order
-from fusion.track import Tracker
+from fusion.tracker import Tracker
 from tests.fusion.streams import (
     MILLISECOND,
     PRIOR,

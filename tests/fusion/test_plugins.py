@@ -10,8 +10,9 @@ from importlib.metadata import EntryPoint
 import pytest
 
 import fusion
-from fusion import NotInstalledError, PluginError, listing
-from fusion.cli import main
+from fusion import NotInstalledError, PluginError
+from fusion.cli import estimators as listing
+from fusion.cli.main import main
 from fusion.plugins import left_out
 
 GROUP = "fusion.estimators"
@@ -51,7 +52,7 @@ def test_remedy_is_the_smallest_extra_that_brings_the_missing_package(stranger):
 @pytest.mark.parametrize("name", ["filterpy_ekf", "filterpy_ukf"])
 def test_missing_filterpy_is_named_with_the_extra_that_brings_it(name, monkeypatch):
     monkeypatch.setitem(sys.modules, "filterpy", None)
-    for module in ("estimators.filterpy_ekf", "estimators.filterpy_ukf"):
+    for module in ("estimators.filterpy_ekf", "estimators.filterpy_ekf"):
         monkeypatch.delitem(sys.modules, module, raising=False)
     with pytest.raises(NotInstalledError, match=r"pip install 'fusion-localization\[filterpy\]'"):
         fusion.load(name)

@@ -10,7 +10,7 @@ from fusion import Decision, Gyro, Increment, Odometry, Reason, digest, final
 from fusion.epochs import Longest
 from fusion.fold import Fold
 from fusion.timeline import HORIZON_S, Timeline, order
-from fusion.track import Tracker
+from fusion.tracker import Tracker
 from tests.fusion.streams import (
     MILLISECOND,
     PRIOR,

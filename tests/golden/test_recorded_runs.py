@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.bench import bench
-from logs.importing import import_recordings
+from benchmarks.runner.adhoc_suite import bench
+from logs.cli.import_ import import_recordings
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 

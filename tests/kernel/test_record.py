@@ -10,11 +10,11 @@ import signal
 import pytest
 
 from fusion import Truth
-from fusion.cli import main
+from fusion.cli.main import main
 from fusion.values import Gyro, MotorCommand, Ranges, WheelTicks, WifiScan
 from kernel import boot
+from logs.message_stream import Walk
 from logs.reader import read_run
-from logs.walk import Walk
 from logs.writer import RunWriter
 
 pytestmark = [pytest.mark.kernel, pytest.mark.usefixtures("gpio")]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fusion import Gyro, Odometry, Ranges, RecordingError, WheelTicks, WifiScan
-from logs.importing import import_recordings
+from logs.cli.import_ import import_recordings
 from logs.reader import read_run
 
 WORLD = """

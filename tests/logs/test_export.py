@@ -22,9 +22,9 @@ from fusion import (
     WifiScan,
     World,
 )
-from fusion.cli import main
-from logs.export import export_csv, export_tum
-from logs.importing import import_recordings
+from fusion.cli.main import main
+from logs.cli.export import export_csv, export_tum
+from logs.cli.import_ import import_recordings
 from logs.reader import read_run
 from logs.writer import RunWriter
 

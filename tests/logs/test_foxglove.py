@@ -10,8 +10,8 @@ from mcap.writer import Writer
 
 from fusion import Gyro, World
 from fusion.errors import ParameterError
+from logs.importers.rosbag import read_bag
 from logs.messages import KINDS, SCHEMAS
-from logs.rosbag import read_bag
 
 SECOND = 1_000_000_000
 T = 1_652_380_260_171_842_098

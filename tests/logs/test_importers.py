@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fusion import Increment, Odometry, Ranges, RecordingError, WifiScan
-from logs.importing import import_recordings
+from logs.cli.import_ import import_recordings
 from logs.reader import read_run
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"

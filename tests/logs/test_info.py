@@ -26,8 +26,8 @@ from fusion import (
     World,
     registered,
 )
-from fusion.cli import main
-from logs.info import describe
+from fusion.cli.main import main
+from logs.cli.info import describe
 from logs.timing import JUMP_MESSAGES, JUMP_NS, Stream
 from logs.writer import RunWriter
 

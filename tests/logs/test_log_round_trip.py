@@ -24,9 +24,9 @@ from fusion import (
     WifiScan,
     World,
 )
-from logs.export import export_csv
-from logs.importing import import_recordings
-from logs.info import describe
+from logs.cli.export import export_csv
+from logs.cli.import_ import import_recordings
+from logs.cli.info import describe
 from logs.messages import PRIOR, encode_prior
 from logs.reader import read_run
 from logs.writer import RunWriter

@@ -19,11 +19,11 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 
 from fusion import Gyro, LogError, World
-from fusion.cli import main
+from fusion.cli.main import main
+from logs.cli.repair import mend, repair
 from logs.reader import read_run
-from logs.records import HEAD, MAGIC
-from logs.repair import mend, repair
-from logs.salvage import Salvage
+from logs.salvage.records import HEAD, MAGIC
+from logs.salvage.scan import Salvage
 from logs.writer import RunWriter
 
 SECOND = 1_000_000_000

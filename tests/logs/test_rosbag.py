@@ -9,11 +9,11 @@ import pytest
 import tomlkit
 
 from fusion import Gyro, Increment, LogError, Odometry, RangeReading, Ranges, RssiReading, WifiScan, World
-from fusion.cli import main
+from fusion.cli.main import main
 from fusion.errors import ParameterError
-from logs.importing import import_recordings
+from logs.cli.import_ import import_recordings
+from logs.importers.rosbag import read_bag
 from logs.reader import read_run
-from logs.rosbag import read_bag
 
 SECOND = 1_000_000_000
 TABLE = {

@@ -5,14 +5,14 @@ import json
 
 import pytest
 
-from benchmarks.bench import bench, remarks
-from benchmarks.calibration.arguments import Findings, calibrate
+from benchmarks.runner.adhoc_suite import bench, remarks
 from fusion import Level, MotorCommand, Odometry, Remark, Truth, WheelTicks, World
-from fusion.cli import main
-from logs.importing import import_recordings
+from fusion.cli.main import main
+from logs.cli.import_ import import_recordings
 from logs.reader import read_run
 from logs.wheel_direction import LEAST_M, DirectionWatch, caution, caution_of_run
 from logs.writer import RunWriter
+from sensors.cli.calibration import Findings, calibrate
 
 SECOND = 1_000_000_000
 TICK_M = 0.0102

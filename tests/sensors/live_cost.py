@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sensors.onboard.live import live
 from sensors.onboard.robot_file import RobotFile
-from sensors.onboard.sensing import Sensing
+from sensors.onboard.sensor_loop import Sensing
 from sensors.simulation.scenario import scenario_text
 
 

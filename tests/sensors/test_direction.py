@@ -8,15 +8,15 @@ from dataclasses import replace
 import pytest
 
 from fusion import FusionError, MotorCommand, SettingError, WheelTicks
-from fusion.cli import main
+from fusion.cli.main import main
 from logs.reader import read_run
 from logs.wheel_direction import caution
-from sensors.onboard import doctor
-from sensors.onboard.keeper import Received, State
+from sensors.cli import doctor
+from sensors.cli.live import record as line
+from sensors.onboard.driver_lifecycle import Received, State
 from sensors.onboard.live import live
-from sensors.onboard.live_verb import record as line
-from sensors.onboard.recording import record
-from sensors.onboard.sensing import Sensing
+from sensors.onboard.recorder import record
+from sensors.onboard.sensor_loop import Sensing
 from sensors.onboard.supervisor import Status
 from tests.sensors.robot_files import robot_text
 

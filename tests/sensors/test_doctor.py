@@ -6,9 +6,9 @@ import os
 import pytest
 
 from fusion import Advice, DriverSpec, Needs
-from fusion.cli import main
+from fusion.cli.main import main
 from fusion.values import Gyro
-from sensors.onboard import doctor
+from sensors.cli import doctor
 from sensors.onboard.robot_file import RobotFile, Sensor
 from tests.sensors.robot_files import robot_text
 

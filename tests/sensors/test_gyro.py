@@ -23,7 +23,7 @@ from sensors.gyro import mpu6050 as gyro_mpu6050
 from sensors.gyro.iio import FakeIio, GyroIio
 from sensors.gyro.mpu6050 import FakeMpu6050, GyroMpu6050, parse
 from sensors.gyro.sampling import UnreadableError
-from sensors.onboard.standstill import Standstill
+from sensors.onboard.gyro_bias import Standstill
 
 
 def chip(**settings):

@@ -7,7 +7,7 @@ import pytest
 from fusion.driver import DeviceInfo, DriverSpec, Level, Remark, VirtualClock
 from fusion.errors import BusyError, DeviceLostError, NotFoundError, NotPermittedError
 from fusion.values import Gyro, nanoseconds
-from sensors.onboard.keeper import LONGEST_WAIT_S, Keeper, State
+from sensors.onboard.driver_lifecycle import LONGEST_WAIT_S, Keeper, State
 
 
 class Scripted:

@@ -12,7 +12,7 @@ from contextlib import closing
 import pytest
 
 import fusion
-from benchmarks.replay import replay
+from benchmarks.cli.replay import replay
 from fusion import (
     Covariance,
     Decision,
@@ -26,13 +26,13 @@ from fusion import (
     Tracker,
     WifiScan,
 )
-from fusion.cli import main
-from logs.joining import join
+from fusion.cli.main import main
+from logs.cli.join import join
 from logs.reader import read_run
+from sensors.cli.live import describe, record
 from sensors.onboard import split_log
-from sensors.onboard.keeper import State
+from sensors.onboard.driver_lifecycle import State
 from sensors.onboard.live import Now, live
-from sensors.onboard.live_verb import describe, record
 from tests.sensors.robot_files import robot_text
 
 
@@ -354,7 +354,17 @@ def started(tmp_path):
     """`fusion live` in a process of its own, after its first line."""
     path = tmp_path / "trolley.toml"
     path.write_text(robot_text())
-    command = [sys.executable, "-m", "fusion.cli", "live", str(path), "--estimator", "ekf", "-o", str(tmp_path / "out")]
+    command = [
+        sys.executable,
+        "-m",
+        "fusion.cli.main",
+        "live",
+        str(path),
+        "--estimator",
+        "ekf",
+        "-o",
+        str(tmp_path / "out"),
+    ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     process.stdout.readline()
     return process

@@ -15,12 +15,12 @@ from pathlib import Path
 import pytest
 
 from fusion import BootClock, LogError, NotFoundError
-from fusion.cli import main
+from fusion.cli.main import main
 from fusion.values import Gyro, WheelTicks, WifiScan
-from logs.joining import join
+from logs.cli.join import join
 from logs.reader import read_run
 from sensors.onboard import split_log
-from sensors.onboard.recording import record
+from sensors.onboard.recorder import record
 from tests.sensors.robot_files import robot_text
 
 LOST_AT_MOST_S = 1.2
@@ -34,7 +34,7 @@ def launched(tmp_path, *words, **options):
     """`fusion record` in a process of its own."""
     path = tmp_path / "trolley.toml"
     path.write_text(robot_text(**options))
-    command = [sys.executable, "-m", "fusion.cli", "record", str(path), "-o", str(tmp_path / "out"), *words]
+    command = [sys.executable, "-m", "fusion.cli.main", "record", str(path), "-o", str(tmp_path / "out"), *words]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from fusion.driver import VirtualClock
 from fusion.errors import SettingError
-from sensors.onboard.keeper import Keeper, State
+from sensors.onboard.driver_lifecycle import Keeper, State
 from sensors.simulation.drivers import SimulatedEncoders, SimulatedGyro, SimulatedTracker, SimulatedWifi
 from sensors.simulation.robot import SimulatedRobot
 from sensors.simulation.scenario import load_scenario

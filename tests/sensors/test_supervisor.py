@@ -7,7 +7,7 @@ import pytest
 from fusion.driver import BootClock, DeviceInfo, DriverSpec, Level, Remark, VirtualClock
 from fusion.errors import DeviceLostError, NotFoundError
 from fusion.values import Gyro
-from sensors.onboard.keeper import Keeper, Received, State
+from sensors.onboard.driver_lifecycle import Keeper, Received, State
 from sensors.onboard.supervisor import Mailbox, Supervisor
 
 TENTH_NS = 100_000_000

@@ -21,7 +21,7 @@ from fusion.errors import (
     UnsupportedError,
 )
 from fusion.values import WifiScan, nanoseconds, seconds
-from sensors.onboard.keeper import Keeper, State
+from sensors.onboard.driver_lifecycle import Keeper, State
 from sensors.wifi.discovery import discover, discover_ranging, may_scan
 from sensors.wifi.loop import FAILURES_TO_STUCK
 from sensors.wifi.nl80211_fake import INDEX, WIPHY, FakeKernel, three_access_points

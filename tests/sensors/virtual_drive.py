@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 from fusion.driver import VirtualClock
-from sensors.onboard.keeper import Keeper
-from sensors.onboard.recording import Recorder
+from sensors.onboard.driver_lifecycle import Keeper
+from sensors.onboard.recorder import Recorder
 from sensors.onboard.robot_file import build_driver
-from sensors.onboard.sensing import Turn
+from sensors.onboard.sensor_loop import Turn
 
 STEP_S = 0.01
 START_NS = 5_000_000_000

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from fusion import Gyro, RssiReading, Truth, WifiScan, World
-from logs.run import Run, TruthTrack
+from logs.run import Run
+from logs.truth import TruthTrack
 from sensors.simulation.scenario import Scenario
 from sensors.simulation.simulate import simulated_run
 

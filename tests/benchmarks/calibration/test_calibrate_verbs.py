@@ -7,17 +7,18 @@ import tomllib
 import numpy as np
 import pytest
 
-from benchmarks.calibration.odometry_verb import findings as odometry_findings
-from benchmarks.calibration.radio_verb import findings as radio_findings
-from benchmarks.calibration.world_file import calibrated_text, world_text
-from benchmarks.lane import run_lane
-from benchmarks.metrics.instants import evaluation_instants, match
-from benchmarks.metrics.track import Track
+from benchmarks.metrics.estimate_track import Track
+from benchmarks.metrics.matching import match
+from benchmarks.runner.estimator_run import run_lane
 from fusion import Truth, World
-from fusion.cli import main
+from fusion.cli.main import main
 from fusion.odometry import Odometer
 from fusion.world import Calibration
+from logs.truth import evaluation_instants
 from logs.writer import RunWriter
+from sensors.calibration.world_file import calibrated_text, world_text
+from sensors.cli.calibrate_odometry import findings as odometry_findings
+from sensors.cli.calibrate_radio import findings as radio_findings
 
 WORLD = """\
 # the hall, measured on a rainy day

@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.calibration.allan import allan, allan_deviation
-from benchmarks.calibration.gyro import calibrate_gyro
 from fusion import Gyro, LogError, ParameterError, WheelTicks
+from sensors.calibration.allan import allan, allan_deviation
+from sensors.calibration.gyro import calibrate_gyro
 
 NOISE = 0.01
 PERIOD_S = 0.02

@@ -8,22 +8,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.calibration.arcs import Roll, arc_end
-from benchmarks.calibration.odometry import (
-    fit_roll,
-    halves,
-    score_held_out,
-)
-from benchmarks.calibration.odometry_verb import calibrate_odometry
-from benchmarks.calibration.rolled import linear_trend, rolled
-from benchmarks.calibration.segments import SPIN, STRAIGHT, find_segments, read_segments
-from benchmarks.calibration.umbmark import umbmark
-from benchmarks.calibration.wheels import wheels
 from fusion import LogError, Odometry, Pose
 from fusion.odometry import Odometer
 from fusion.values import nanoseconds
 from fusion.world import Robot
-from logs.run import TruthTrack
+from logs.truth import TruthTrack
+from sensors.calibration.arcs import Roll, arc_end
+from sensors.calibration.odometry import calibrate_odometry, fit_roll, halves, score_held_out
+from sensors.calibration.segments import SPIN, STRAIGHT, find_segments, read_segments
+from sensors.calibration.umbmark import umbmark
+from sensors.calibration.wheel_residuals import linear_trend, rolled
+from sensors.calibration.wheels import wheels
 
 TRACK = 0.3
 

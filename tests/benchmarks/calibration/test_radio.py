@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.calibration.radio import calibrate_radio, kinds_in
-from benchmarks.calibration.radio_verb import findings
-from benchmarks.calibration.readings import gather, places
 from fusion import LogError, RangeReading, Ranges, RssiReading, WifiScan
 from fusion.radio import PathLoss
-from logs.run import TruthTrack
+from logs.truth import TruthTrack
+from sensors.calibration.radio import calibrate_radio, kinds_in
+from sensors.calibration.readings_by_place import gather, places
+from sensors.cli.calibrate_radio import findings
 
 AT = np.array([[0.0, 0.0, 2.0], [12.0, 0.0, 2.0], [6.0, 9.0, 2.0]])
 N, LEVEL = 2.4, -38.0

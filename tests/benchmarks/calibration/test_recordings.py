@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.calibration.odometry_verb import calibrate_odometry
-from benchmarks.calibration.radio import calibrate_radio
 from fusion import World
 from fusion.radio import Ranging
-from logs.importing import import_recordings
+from logs.cli.import_ import import_recordings
 from logs.reader import read_run
+from sensors.calibration.odometry import calibrate_odometry
+from sensors.calibration.radio import calibrate_radio
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
 

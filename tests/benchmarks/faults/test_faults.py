@@ -9,21 +9,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.faults.faults import KINDS, apply_faults, fault_seed, outages, read_fault, stable_hash
+from benchmarks.faults.inject import KINDS, apply_faults, fault_seed, outages, read_fault, stable_hash
 from benchmarks.faults.message_faults import Clock, Delay, Drop, GyroDrop
 from benchmarks.faults.motion_faults import WHEELS, BadStart, Freeze, GyroBias, Kidnap, Slip
 from benchmarks.faults.radio_faults import Nlos, Outlier, PowerStep, RssiNoise
-from benchmarks.lane import run_lane
-from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors
-from benchmarks.prior import starting_prior
+from benchmarks.runner.estimator_run import run_lane
 from fusion import Gyro, MeasurementError, Odometry, ParameterError, Ranges, RssiReading, WheelTicks, WifiScan
-from fusion.drive import Drive
+from fusion.conformance.synthetic_run import Drive
 from fusion.odometry import Odometer
 from fusion.timeline import order
 from fusion.values import nanoseconds, seconds
 from fusion.world import DRIVES
+from logs.prior import starting_prior
 from logs.run import Run
+from logs.truth import evaluation_instants
 from sensors.simulation.scenario import load_scenario
 from sensors.simulation.simulate import simulated_run
 

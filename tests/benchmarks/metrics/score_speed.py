@@ -17,22 +17,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.metrics.archive import from_bytes, to_bytes
 from benchmarks.metrics.consistency import Claimed, consistency_metrics, distribution_metrics
-from benchmarks.metrics.course import Instants
-from benchmarks.metrics.deviation import Errors, errors
+from benchmarks.metrics.convergence import dynamic_metrics
 from benchmarks.metrics.drift import drift_metrics
-from benchmarks.metrics.dynamics import dynamic_metrics
+from benchmarks.metrics.errors import Errors, errors
+from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.fates import FateColumns
-from benchmarks.metrics.instants import evaluation_instants, match
 from benchmarks.metrics.intervals import interval_metrics
+from benchmarks.metrics.matching import match
 from benchmarks.metrics.position import axis_metrics, heading_metrics, position_metrics, track_metrics
-from benchmarks.metrics.quantiles import Ordered
+from benchmarks.metrics.relative_pose import trajectory_metrics
 from benchmarks.metrics.score import for_json, metrics
-from benchmarks.metrics.track import Track
-from benchmarks.metrics.trajectory import trajectory_metrics
+from benchmarks.runner.archive import from_bytes, to_bytes
 from benchmarks.runner.store import to_json
-from logs.run import TruthTrack
+from fusion.quantiles import Ordered
+from logs.truth import Instants, TruthTrack, evaluation_instants
 
 RATE_HZ = 10.0
 KINDS: dict[str, Callable[[Errors, Ordered, Claimed], object]] = {
@@ -144,7 +143,7 @@ def measure_files(poses: int = 100_000, rounds: int = 3, words: tuple[str, ...] 
             rows = [1e-9 * track.time_ns, x, y, z, z, z, np.sin(heading / 2.0), np.cos(heading / 2.0)]
             np.savetxt(file, np.column_stack(rows), fmt="%.6f")
         pair = ["--truth", str(files[0]), "--estimate", str(files[1]), *words]
-        costs = [_process([sys.executable, "-m", "fusion.cli", "bench", "score", *pair]) for _ in range(rounds)]
+        costs = [_process([sys.executable, "-m", "fusion.cli.main", "bench", "score", *pair]) for _ in range(rounds)]
     return FilesCost(min(cost.cpu_s for cost in costs), min(cost.rss_mb for cost in costs))
 
 

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics.alignment import align
-from benchmarks.metrics.course import Instants
-from benchmarks.metrics.instants import match
+from benchmarks.metrics.matching import match
+from benchmarks.metrics.relative_pose import Poses, relative_errors
 from benchmarks.metrics.score import errors, metrics
-from benchmarks.metrics.tracks import read_track, read_truth
-from benchmarks.metrics.trajectory import Poses, relative_errors
+from benchmarks.metrics.track_files import read_track, read_truth
+from logs.truth import Instants
 
 pytestmark = pytest.mark.skipif(shutil.which("evo_ape") is None, reason="evo is not installed")
 N = 400

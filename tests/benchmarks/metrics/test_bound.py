@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.metrics.bound import (
+from benchmarks.limits.fix_bound import (
     Places,
     Shared,
     anchor_information,

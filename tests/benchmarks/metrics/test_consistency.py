@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from benchmarks.metrics.claims import _tail, energy_scores, judge
 from benchmarks.metrics.consistency import CHI_SQUARE_95, distribution_metrics
-from benchmarks.metrics.deviation import errors
+from benchmarks.metrics.effective_samples import binomial_interval, effective_sizes, mean_chi_square_band, order_shares
+from benchmarks.metrics.errors import errors
 from benchmarks.metrics.intervals import quantile_intervals
-from benchmarks.metrics.quantiles import Ordered
-from benchmarks.metrics.samples import binomial_interval, effective_sizes, mean_chi_square_band, order_shares
+from benchmarks.metrics.proper_scores import _tail, energy_scores, judge
 from benchmarks.metrics.score import metrics
+from fusion.quantiles import Ordered
 
 BANDS = {
     (1, 1): (0.0010, 5.0239),

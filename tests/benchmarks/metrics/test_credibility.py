@@ -7,7 +7,7 @@ import pytest
 from scipy.special import digamma
 
 from benchmarks.metrics.credibility import LEAST_SEEDS, credibility_metrics
-from benchmarks.metrics.deviation import errors
+from benchmarks.metrics.errors import errors
 
 ACTUAL = np.diag([0.04, 0.09, 0.01])
 

@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.metrics.deviation import errors, pool
-from benchmarks.metrics.drift import MOST_PAIRS, drift_metrics, pairs_of, theil_sen
-from benchmarks.metrics.dynamics import (
+from benchmarks.metrics.convergence import (
     convergence_metrics,
     failure_metrics,
     fault_metrics,
@@ -15,6 +13,8 @@ from benchmarks.metrics.dynamics import (
     silence_metrics,
     stretches,
 )
+from benchmarks.metrics.drift import MOST_PAIRS, drift_metrics, pairs_of, theil_sen
+from benchmarks.metrics.errors import errors, pool
 
 
 @pytest.fixture

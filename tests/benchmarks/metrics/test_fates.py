@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from benchmarks.metrics.archive import from_bytes, to_bytes
+from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.fates import DECISIONS, KINDS, REASONS, FateColumns, fates_per_update
-from benchmarks.metrics.track import Track
+from benchmarks.runner.archive import from_bytes, to_bytes
 from fusion import Decision, Estimate, Fate, Gyro, Odometry, Pose, Ranges, Reason, Update, WifiScan
 
 TAKEN, GATED = (Decision.USED, Reason.OK), (Decision.REJECTED, Reason.GATE)

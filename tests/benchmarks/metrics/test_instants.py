@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.metrics.instants import evaluation_instants, interpolate_truth, known_truth, match
-from benchmarks.metrics.track import Track
+from benchmarks.metrics.estimate_track import Track
+from benchmarks.metrics.matching import match
 from fusion import Covariance, Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, Update
 from fusion.timeline import order
-from logs.run import TruthTrack
+from logs.truth import TruthTrack, evaluation_instants, interpolate_truth, known_truth
 
 SECOND = 1_000_000_000
 

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.metrics.interpolation import meet
-from benchmarks.metrics.quantiles import Ordered, mean, quantile
+from benchmarks.metrics.estimate_track import Track
+from benchmarks.metrics.matching import meet
 from benchmarks.metrics.score import errors, metrics
-from benchmarks.metrics.track import Track
-from logs.run import TruthTrack
+from fusion.quantiles import Ordered, mean, quantile
+from logs.truth import TruthTrack
 
 
 def stamps(time_s):

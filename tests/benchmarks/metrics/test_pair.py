@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.metrics import pair_verb
+from benchmarks.cli import bench_score as pair_verb
 from benchmarks.metrics.alignment import align
-from benchmarks.metrics.course import Instants
-from benchmarks.metrics.instants import Answers
-from benchmarks.metrics.pair import MODES, score_pair
+from benchmarks.metrics.matching import Answers
+from benchmarks.metrics.relative_pose import Poses, relative_errors
 from benchmarks.metrics.score import errors, metrics
-from benchmarks.metrics.tracks import read_track, read_truth
-from benchmarks.metrics.trajectory import Poses, relative_errors
+from benchmarks.metrics.track_files import read_track, read_truth
+from benchmarks.metrics.track_pair import MODES, score_pair
 from fusion import Estimate, FusionError, LogError, Odometry, ParameterError, Pose, Truth, Update, World
+from logs.truth import Instants
 from logs.writer import RunWriter
 
 GOLDEN = {

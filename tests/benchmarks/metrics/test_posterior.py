@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.lane import run_lane
-from benchmarks.metrics.instants import evaluation_instants, match
-from benchmarks.metrics.posterior import eff_pcrlb, posterior_bound
+from benchmarks.limits.posterior_bound import eff_pcrlb, posterior_bound
+from benchmarks.metrics.matching import match
+from benchmarks.runner.estimator_run import run_lane
 from fusion import (
     Covariance,
     LogError,
@@ -24,10 +24,11 @@ from fusion import (
     WifiScan,
     World,
 )
-from fusion.drive import Drive
+from fusion.conformance.synthetic_run import Drive
 from fusion.motion import step_noise
 from fusion.values import NANOSECONDS
-from logs.run import Run, TruthTrack
+from logs.run import Run
+from logs.truth import TruthTrack, evaluation_instants
 
 EXACT = {
     "distance_scale_std": 0.0,

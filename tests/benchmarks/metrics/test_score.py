@@ -10,12 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.metrics.course import Instants
-from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.estimate_track import Track
+from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors, for_json, metrics, pool, quantile
-from benchmarks.metrics.track import Track
 from fusion import Covariance, Estimate, Odometry, Pose, Update, wrap_angle
-from logs.run import TruthTrack
+from logs.truth import Instants, TruthTrack, evaluation_instants
 
 ROOT = Path(__file__).resolve().parents[3]
 STEP_NS = 100_000_000

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.metrics import course, samples
-from benchmarks.metrics.deviation import errors, pool
+from benchmarks.metrics import effective_samples as samples
+from benchmarks.metrics.errors import errors, pool
 from benchmarks.metrics.score import metrics
+from logs import truth as course
 
 
 @pytest.fixture

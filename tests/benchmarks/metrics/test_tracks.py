@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import fusion
-from benchmarks.metrics.tracks import read_track, read_truth
+from benchmarks.metrics.track_files import read_track, read_truth
 from fusion import Covariance, Estimate, LogError, Odometry, Pose, Truth, Update
-from logs.export import export_csv, export_tum
+from logs.cli.export import export_csv, export_tum
 from logs.writer import RunWriter
 
 WORLD = fusion.World.from_table({"name": "corridor", "bounds": {"x_min": 0, "x_max": 8, "y_min": -1, "y_max": 3}})

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.metrics.course import ahead
-from benchmarks.metrics.deviation import errors
-from benchmarks.metrics.trajectory import Poses, relative_errors, trajectory_metrics
+from benchmarks.metrics.errors import errors
+from benchmarks.metrics.relative_pose import Poses, relative_errors, trajectory_metrics
 from fusion import Pose
+from logs.truth import ahead
 
 ANGLES, PLACES = st.floats(-3.0, 3.0), st.floats(-20.0, 20.0)
 POSES = st.lists(st.builds(Pose, PLACES, PLACES, ANGLES), min_size=2, max_size=2)

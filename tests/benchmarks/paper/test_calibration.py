@@ -5,16 +5,22 @@ import tomllib
 import numpy as np
 import pytest
 
-from benchmarks.lane import run_lane
-from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors as score
 from benchmarks.paper import calibrate, calibrated
 from benchmarks.paper.assumptions import ALTERNATIVES, MAIN, filled
-from benchmarks.paper.calibrate import SEEDS, Solved, Unknown, solve, unknowns
-from benchmarks.paper.calibrated import ALTERNATIVES_FILE, calibrated_alternative, calibrated_numbers, write_calibrated
+from benchmarks.paper.environment_files import (
+    ALTERNATIVES_FILE,
+    calibrated_alternative,
+    calibrated_numbers,
+    write_calibrated,
+)
+from benchmarks.paper.fit_environments import SEEDS, Solved, Unknown, solve, unknowns
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.variants import without_gyro
+from benchmarks.runner.estimator_run import run_lane
 from fusion import FusionError, WifiScan, WorldError
+from logs.truth import evaluation_instants
 from sensors.simulation.scenario import Scenario, load_scenario, scenario_text
 from sensors.simulation.simulate import simulated_run
 

@@ -6,10 +6,10 @@ import pytest
 from benchmarks.paper import evidence
 from benchmarks.paper.claims import CLAIMS, FEWEST_RUNS, Judged, in_words, judge, runs_to_decide, verdict
 from benchmarks.paper.experiment import Outcome
-from benchmarks.paper.moves import MOVES_M
+from benchmarks.paper.interpretation_study import effects, literal_of_scale, rank
+from benchmarks.paper.interpretations import MISSING_VALUES, ORIGINS_M, READINGS
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
-from benchmarks.paper.readings import MISSING_VALUES, ORIGINS_M, READINGS
-from benchmarks.paper.study import effects, literal_of_scale, rank
+from benchmarks.paper.straight_moves import MOVES_M
 from benchmarks.paper.summary import Share, Spread
 from sensors.simulation.scenario import load_scenario
 

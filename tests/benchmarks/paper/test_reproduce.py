@@ -7,23 +7,24 @@ import numpy as np
 import pytest
 
 import fusion
-from benchmarks.lane import run_lane
-from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors
 from benchmarks.paper import reproduce as module
-from benchmarks.paper.calibrate import SEEDS
 from benchmarks.paper.claims import in_words
 from benchmarks.paper.experiment import run_experiments
 from benchmarks.paper.figures import FIGURES
+from benchmarks.paper.fit_environments import SEEDS
+from benchmarks.paper.interpretations import ORIGINS_M, READINGS, literal
 from benchmarks.paper.page import markdown
 from benchmarks.paper.published import EKF, ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
-from benchmarks.paper.readings import ORIGINS_M, READINGS, literal
 from benchmarks.paper.reproduce import reproduce
 from benchmarks.paper.trial import GYRO, GYRO_LANES, run_alternative, run_trial
 from benchmarks.paper.variants import with_gyro
-from benchmarks.sheet import as_markdown
+from benchmarks.runner.estimator_run import run_lane
 from fusion import ParameterError, WorldError
-from fusion.cli import main
+from fusion.cli.main import main
+from fusion.output.tables import as_markdown
+from logs.truth import evaluation_instants
 from sensors.simulation.scenario import load_scenario
 from sensors.simulation.simulate import simulated_run
 

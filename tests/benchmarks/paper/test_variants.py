@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.lane import run_lane
+from benchmarks.paper.interpretation_study import literal_of_scale
+from benchmarks.paper.interpretations import OPTIONS, READINGS, SCALES, literal
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
-from benchmarks.paper.readings import OPTIONS, READINGS, SCALES, literal
-from benchmarks.paper.study import literal_of_scale
 from benchmarks.paper.trial import lane_errors
 from benchmarks.paper.variants import MISSING_SHARE, leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
+from benchmarks.runner.estimator_run import run_lane
 from fusion import Gyro, Odometry, WifiScan
 from sensors.simulation.scenario import load_scenario
 from sensors.simulation.simulate import simulated_run

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.paper.weaknesses import OFFSETS_M, SLIPPING_LEG, lock_out_example, origin_example
+from benchmarks.paper.outlier_rule_examples import OFFSETS_M, SLIPPING_LEG, lock_out_example, origin_example
 
 
 def test_origin_alone_decides_whether_a_fix_is_an_outlier():

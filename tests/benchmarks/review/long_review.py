@@ -12,9 +12,9 @@ import numpy as np
 
 import fusion
 from benchmarks.cell import Cell, score_lane
-from benchmarks.clouds import CloudWatch
-from benchmarks.lane import Lane
+from benchmarks.review.particle_clouds import CloudWatch
 from benchmarks.review.scene import write_scene
+from benchmarks.runner.estimator_run import Lane
 from fusion import (
     Covariance,
     Decision,
@@ -32,7 +32,8 @@ from fusion import (
     Update,
 )
 from fusion.values import NANOSECONDS
-from logs.run import Run, TruthTrack
+from logs.run import Run
+from logs.truth import TruthTrack
 
 RATE_HZ = 50
 STEPS_PER_SCAN = 10

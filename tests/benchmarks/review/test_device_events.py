@@ -1,6 +1,6 @@
 """A review of a recording tells what became of its devices."""
 
-from benchmarks.review.device_events import worth_a_line
+from benchmarks.review.raw_sensors import worth_a_line
 from fusion import Level, Remark
 from logs.run import Run
 

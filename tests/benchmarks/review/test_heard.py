@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fusion
-from benchmarks.review.heard import heard
+from benchmarks.review.radio_circles import heard
 from fusion import Gyro, RangeReading, Ranges, RssiReading, WifiScan
 
 WORLD = fusion.World.from_table(

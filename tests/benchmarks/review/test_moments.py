@@ -9,16 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fusion
-from benchmarks.bench import parse_settings
 from benchmarks.cell import Cell, score_lane
-from benchmarks.lane import Lane
-from benchmarks.metrics.peaks import SPACING_S, peaks
 from benchmarks.review.drawing import drawings
-from benchmarks.review.invocation import review_command
-from benchmarks.review.moments import Moment, worst_moments
-from benchmarks.review.pulls import Growth
+from benchmarks.review.error_causes import Growth
+from benchmarks.review.moments import SPACING_S, Moment, peaks, worst_moments
+from benchmarks.runner.estimator_run import Lane
+from benchmarks.runner.review_command import review_command
 from fusion import Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, Truth, Update
-from logs.run import Run, TruthTrack
+from fusion.cli.options import parse_settings
+from logs.run import Run
+from logs.truth import TruthTrack
 
 SECOND_NS = 1_000_000_000
 WORLD = fusion.World.from_table(

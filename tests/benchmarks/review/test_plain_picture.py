@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import fusion
-from benchmarks.bench import bench
-from benchmarks.colours import ANCHOR, TRUTH, colour_of
-from benchmarks.plotting import plain
 from benchmarks.review.drawing import SHOWN, drawings
 from benchmarks.review.folding import fold
 from benchmarks.review.plain_picture import draw_plainly, figure
+from benchmarks.runner.adhoc_suite import bench
 from fusion import FusionError
+from fusion.output.colours import ANCHOR, TRUTH, colour_of
+from fusion.output.figures import plain
 from logs.reader import read_run
 from sensors.simulation.simulate import simulate
 

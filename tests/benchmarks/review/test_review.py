@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.review.review import review
 from fusion import ParameterError
-from fusion.cli import main
+from fusion.cli.main import main
 from logs.reader import read_run
 from sensors.simulation.simulate import simulate
 

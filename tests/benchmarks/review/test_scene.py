@@ -10,17 +10,15 @@ from scipy.special import gammaincinv
 
 import fusion
 from benchmarks.cell import Cell, score_lane
-from benchmarks.clouds import MOST_POINTS, CloudWatch
-from benchmarks.colours import ESTIMATORS, colour_of
-from benchmarks.lane import run_lane
 from benchmarks.review.blueprint import reach
-from benchmarks.review.canvas import MOST_POSES, thinned
+from benchmarks.review.canvas import MOST_POSES, mostly_jumps, thinned
 from benchmarks.review.counterfactual import ghost_lane, without_anchor
 from benchmarks.review.drawing import drawings
 from benchmarks.review.estimator_layer import PARTICLE_PIXELS, newest
 from benchmarks.review.estimator_plots import NEES_BOUNDS
-from benchmarks.review.paths import mostly_jumps
+from benchmarks.review.particle_clouds import MOST_POINTS, CloudWatch
 from benchmarks.review.scene import markdown, write_scene
+from benchmarks.runner.estimator_run import run_lane
 from fusion import (
     Covariance,
     Decision,
@@ -33,7 +31,9 @@ from fusion import (
     Truth,
     WifiScan,
 )
-from logs.run import Run, TruthTrack
+from fusion.output.colours import ESTIMATORS, colour_of
+from logs.run import Run
+from logs.truth import TruthTrack
 
 rerun = pytest.importorskip("rerun", reason="needs the extra `review`")
 

@@ -9,11 +9,11 @@ import pytest
 import tomlkit
 from rosbags.typesys import Stores
 
-from benchmarks.runner.definition import RunSource
-from benchmarks.runner.source import content_of
+from benchmarks.runner.run_source import content_of
 from benchmarks.runner.store import Store
+from benchmarks.runner.suite import RunSource
 from fusion import WheelTicks, WifiScan
-from fusion.cli import main
+from fusion.cli.main import main
 from sensors.simulation.scenario import load_scenario
 from sensors.simulation.simulate import simulate, simulated_run
 from tests.logs.foreign_bags import Ros

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.runner.definition import CLEAN, load_suite
+from benchmarks.runner.suite import CLEAN, load_suite
 from fusion import SuiteError
 
 SUITE = """

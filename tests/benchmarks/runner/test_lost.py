@@ -5,14 +5,14 @@ import math
 import pytest
 
 import fusion
-from benchmarks.report.material import Material
+from benchmarks.cli import bench_run as run_verb
+from benchmarks.report.report_data import Material
 from benchmarks.report.tables import fixes, leaderboard, limits, lost
 from benchmarks.runner import results as stored
-from benchmarks.runner import run_verb
-from benchmarks.runner.definition import load_suite
 from benchmarks.runner.execute import carry_out
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.store import Store
+from benchmarks.runner.suite import load_suite
 from estimators.dead_reckoning import DeadReckoning
 from fusion import Pose
 from fusion.values import nanoseconds

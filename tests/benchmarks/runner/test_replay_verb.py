@@ -2,12 +2,12 @@
 
 import pytest
 
-from benchmarks.lane import run_lane
-from benchmarks.runner.definition import load_suite
+from benchmarks.runner.estimator_run import run_lane
 from benchmarks.runner.execute import carry_out, faulty_run
-from benchmarks.runner.replay_verb import one_cell, replay_cell
+from benchmarks.runner.replay_log import one_cell, replay_cell
 from benchmarks.runner.store import Store
-from fusion.cli import main
+from benchmarks.runner.suite import load_suite
+from fusion.cli.main import main
 from logs.reader import read_run
 
 FAULTS = {

@@ -14,23 +14,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.metrics.archive import from_bytes
-from benchmarks.metrics.instants import evaluation_instants, match
+from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors
-from benchmarks.prior import begin_ns
 from benchmarks.runner import reference
-from benchmarks.runner.definition import Contestant, load_suite
+from benchmarks.runner.archive import from_bytes
 from benchmarks.runner.execute import carry_out, faulty_run, stored_track
-from benchmarks.runner.export_verb import as_csv
+from benchmarks.runner.export import as_csv
+from benchmarks.runner.leaderboard import leaderboard
 from benchmarks.runner.plan import cells_of, missing, shard
-from benchmarks.runner.refusals import refuse_impossible
-from benchmarks.runner.results import flat, leaderboard, read_results
-from benchmarks.runner.run_verb import run_suite
-from benchmarks.runner.source import open_run
+from benchmarks.runner.preflight import refuse_impossible
+from benchmarks.runner.results import flat, read_results
+from benchmarks.runner.run_source import open_run
+from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
+from benchmarks.runner.suite import Contestant, load_suite
 from fusion import FusionError, SuiteError, registered
-from fusion.cli import main
+from fusion.cli.main import main
+from logs.prior import begin_ns
 from logs.reader import read_run, read_world
+from logs.truth import evaluation_instants
 from sensors.simulation.simulate import simulate
 
 SUITE = """
@@ -335,7 +337,7 @@ def test_what_is_in_the_store_is_not_tried_again(suite, tmp_path, monkeypatch):
 def test_runner_that_was_killed_leaves_a_store_that_is_gone_on_with(suite, tmp_path):
     """SIGKILL as soon as the first estimate is there."""
     store = Store(tmp_path / "store")
-    command = [sys.executable, "-m", "fusion.cli", "bench", "run", str(tmp_path / "small.toml")]
+    command = [sys.executable, "-m", "fusion.cli.main", "bench", "run", str(tmp_path / "small.toml")]
     process = subprocess.Popen([*command, "--store", str(store.folder), "-j", "2"], stdout=subprocess.DEVNULL)
     while not list(store.folder.glob("scores/*/*")):
         assert process.poll() is None or process.returncode == 0

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from benchmarks.runner import definition
-from benchmarks.runner.definition import builtin_suites, load_suite
 from benchmarks.runner.plan import contestant_spec, read_faults
+from benchmarks.runner.suite import builtin_suites, load_suite
 from fusion import SuiteError
-from fusion.cli import main
-from logs.importing import KINDS
+from fusion.cli.main import main
+from logs.cli.import_ import KINDS
 from sensors.simulation.scenario import builtin_names
 
 SUITES = Path(definition.__file__).parents[1] / "suites"
@@ -102,7 +102,7 @@ def test_suite_that_needs_what_is_not_installed_is_refused_by_name(optional, str
 @pytest.mark.parametrize("name", ["quick", "paper", "synthetic", "real"])
 def test_built_in_suite_does_without_packages_that_a_base_install_lacks(name, monkeypatch):
     monkeypatch.setitem(sys.modules, "filterpy", None)
-    for module in ("estimators.filterpy_ekf", "estimators.filterpy_ukf"):
+    for module in ("estimators.filterpy_ekf", "estimators.filterpy_ekf"):
         monkeypatch.delitem(sys.modules, module, raising=False)
     suite = load_suite(Path(name))
     assert not [one.use for one in suite.contestants if one.use.startswith("filterpy")]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fusion.cli import main
+from fusion.cli.main import main
 
 SUITE = """
 [suite]

@@ -11,20 +11,18 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics.score import METRICS_VERSION
-from benchmarks.runner.baseline import read_baseline
-from benchmarks.runner.compare_verb import stored_results
-from benchmarks.runner.definition import Contestant, FaultSet, Gate, RunSource, load_suite
-from benchmarks.runner.export_verb import as_junit, as_latex
-from benchmarks.runner.gate_verb import Outcome, judge
+from benchmarks.runner.export import as_junit, as_latex
+from benchmarks.runner.gate import Outcome, judge, read_baseline
 from benchmarks.runner.plan import cells_of
-from benchmarks.runner.results import comparison, flat, score_matrix
-from benchmarks.runner.run_verb import run_suite
+from benchmarks.runner.results import comparison, flat, score_matrix, stored_results
+from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.time_verb import measure
-from benchmarks.runner.verify_verb import differing
-from benchmarks.sheet import Sheet
-from benchmarks.workers import Limits
-from fusion.cli import main
+from benchmarks.runner.suite import Contestant, FaultSet, Gate, RunSource, load_suite
+from benchmarks.runner.timing import measure
+from benchmarks.runner.verify import differing
+from benchmarks.runner.workers import Limits
+from fusion.cli.main import main
+from fusion.output.tables import Sheet
 
 HEAD = '[suite]\nname = "verbs"\n'
 RUNS = "".join(

@@ -3,7 +3,7 @@
 import pytest
 
 from fusion import Truth, WheelTicks, World
-from fusion.cli import main
+from fusion.cli.main import main
 from logs.writer import RunWriter
 
 SECOND = 1_000_000_000

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.metrics.bound import Places, fix_error
-from benchmarks.sites.placement import (
+from benchmarks.limits.anchor_placement import (
     NEW,
     Grid,
     Readings,
@@ -21,6 +20,7 @@ from benchmarks.sites.placement import (
     losses,
     new_anchor,
 )
+from benchmarks.limits.fix_bound import Places, fix_error
 from fusion import Bounds, World
 
 RANGES = Readings("range")

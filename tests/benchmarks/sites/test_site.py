@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.metrics.bound import fix_error
-from benchmarks.sites.site_plan import plan_site
-from benchmarks.sites.site_report import gain_m, record, sheets
-from benchmarks.sites.site_source import choose_radio, load_site
+from benchmarks.limits.fix_bound import fix_error
+from benchmarks.limits.floor_plan import plan_site
+from benchmarks.limits.floor_source import choose_radio, load_site
+from benchmarks.limits.floor_tables import gain_m, record, sheets
 from fusion import LogError, ParameterError, WorldError
-from fusion.cli import main
+from fusion.cli.main import main
 from sensors.simulation.scenario import load_scenario, scenario_text
 from sensors.simulation.simulate import simulate
 

@@ -6,13 +6,13 @@ import sys
 import numpy as np
 import pytest
 
-from benchmarks.sites.site_plan import plan_site
+from benchmarks.limits.floor_plan import plan_site
 from fusion import FusionError
-from fusion.cli import main
+from fusion.cli.main import main
 
 pytest.importorskip("matplotlib", reason="needs the extra `plots`")
-from benchmarks import plotting
-from benchmarks.sites import site_picture
+from benchmarks.limits import floor_picture as site_picture
+from fusion.output import figures as plotting
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from benchmarks.statistics.statistics import (
+from benchmarks.statistics.paired_tests import (
     MAX_RUNS,
     detectable_effect,
     friedman_p,

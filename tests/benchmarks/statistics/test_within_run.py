@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.statistics.within_run import block_length, resampled, within_run
+from benchmarks.statistics.block_bootstrap import block_length, resampled, within_run
 from fusion import ParameterError
 
 

@@ -10,7 +10,7 @@ import sys
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from fusion.cli import main
+from fusion.cli.main import main
 from kernel.guest.system import wait_until
 
 SLOW_IMPORTS = ("gpiod", "smbus2", "serialx", "pyroute2.netlink.generic")

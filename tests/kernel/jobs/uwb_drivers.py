@@ -7,7 +7,7 @@ from typing import Any
 
 from fusion import BootClock, NotFoundError, Ranges, Remark, Said
 from kernel.guest.serial import NEAR, Module, UsbSerial
-from sensors.onboard.keeper import Keeper
+from sensors.onboard.driver_lifecycle import Keeper
 from sensors.uwb.dwm1001 import FakeShell, UwbDwm1001
 from sensors.uwb.fake_serial import Mute, Talker
 from sensors.uwb.lines import UwbLines

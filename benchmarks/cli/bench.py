@@ -1,0 +1,48 @@
+"""``fusion bench``: score estimators on recorded runs, all on the same measurements from the same start."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from benchmarks.runner.adhoc_suite import bench, pooled, remarks, write_records
+from fusion.cli.arguments import at_least_one, not_negative
+from fusion.cli.options import parse_settings
+from fusion.output.progress import progress_bar
+from fusion.plugins import left_out
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion bench``."""
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="MCAP logs")
+    parser.add_argument("--estimators", metavar="A,B", help="names, separated by commas; all installed by default")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME.KEY=VALUE", help="a parameter of an estimator; repeatable"
+    )
+    parser.add_argument("--json", type=Path, metavar="OUT", help="write one record per run and estimator; - for stdout")
+    parser.add_argument("--seed", type=not_negative, default=0, help="of the estimators that draw random numbers")
+    parser.add_argument("--workers", type=at_least_one, metavar="N", help="processes; one per core by default")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Bench, print the tables, write the records. Exit code 1 when no estimator survived."""
+    chosen = None if arguments.estimators is None else arguments.estimators.split(",")
+    with progress_bar("bench") as progress:
+        scores = bench(
+            arguments.runs,
+            estimators=chosen,
+            settings=parse_settings(arguments.set),
+            seed=arguments.seed,
+            workers=arguments.workers,
+            progress=progress,
+        )
+    for remark in (*(left_out() if chosen is None else ()), *remarks(scores)):
+        sys.stderr.write(f"fusion bench: {remark}\n")
+    if arguments.json != Path("-"):
+        from benchmarks.runner.leaderboard import print_tables
+
+        print_tables(scores, pooled(scores))
+    if arguments.json is not None:
+        write_records(scores, arguments.json)
+    return 1 if all(score.status == "crashed" for score in scores) else 0

@@ -1,0 +1,73 @@
+"""``fusion bench run``: compute what is missing of a suite, and print what came out."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Sequence
+
+from benchmarks.cell import ALIVE
+from benchmarks.cli.bench_plan import opened
+from benchmarks.cli.suite_arguments import suite_options
+from benchmarks.runner.leaderboard import leaderboard, partly_headed
+from benchmarks.runner.results import Result, warnings
+from benchmarks.runner.run_suite import run_suite
+from benchmarks.runner.suite import CLEAN
+from fusion.cli.arguments import at_least_one
+from fusion.output.progress import progress_bar
+from fusion.output.tables import print_sheets
+
+
+def lost(results: Sequence[Result]) -> list[str]:
+    """Why contestants have no score in some cells: a sentence for each status they ended with, and its first reason."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for one in results:
+        if one.status not in ALIVE:
+            reasons.setdefault((one.cell.contestant.id, one.status), []).append(one.error or one.status)
+    return [f"{name} lost {len(own)} of its cells: {_first(own)}" for (name, _), own in reasons.items()]
+
+
+def _first(reasons: Sequence[str]) -> str:
+    others = len(set(reasons)) - 1
+    return reasons[0] + (f" (and {others} more reasons; `fusion bench report` lists all)" if others else "")
+
+
+def remarks(results: Sequence[Result]) -> list[str]:
+    """Where the truth of a run has a heading at some instants only, one sentence for each run."""
+    told = [(one.cell.run.id, partly_headed(one.metrics)) for one in results if one.cell.fault.id == CLEAN]
+    return [f"{run}: {sentence}" for run, sentence in dict(told).items() if sentence]
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion bench run``."""
+    suite_options(parser)
+    parser.add_argument("-j", "--workers", type=at_least_one, metavar="N", help="processes; one per core by default")
+    parser.add_argument("--shard", type=_shard, metavar="I/N", help="only the I-th of N parts, by key")
+    parser.add_argument("--dask", metavar="ADDRESS", help="carry the cells out on this Dask scheduler")
+
+
+def _shard(text: str) -> tuple[int, int]:
+    number, _, count = text.partition("/")
+    if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
+        raise argparse.ArgumentTypeError(f"{text!r}: give I/N, as in 1/4 for the first of four parts")
+    return int(number), int(count)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run, print the leaderboard. Exit code 1 when no cell survived, 3 when none was measured."""
+    suite, store = opened(arguments)
+    with progress_bar("bench run") as progress:
+        results = run_suite(
+            suite, store, workers=arguments.workers, part=arguments.shard, dask=arguments.dask, progress=progress
+        )
+    if not results:
+        return 3
+    counted = Counter(result.status for result in results)
+    sys.stderr.write(
+        f"fusion bench run: {', '.join(f'{count} {status}' for status, count in sorted(counted.items()))}\n"
+    )
+    for reason in (*warnings(results), *lost(results), *remarks(results)):
+        sys.stderr.write(f"fusion bench run: {reason}\n")
+    print_sheets([leaderboard(results)])
+    return 0 if any(result.status in ALIVE for result in results) else 1

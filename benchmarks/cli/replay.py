@@ -1,0 +1,92 @@
+"""``fusion replay``: run one estimator over a log again, and keep everything it said beside the measurements."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import fusion
+from benchmarks.cell import cached_run
+from benchmarks.runner.estimator_run import Lane, run_lane
+from benchmarks.runner.replay_log import write_replay
+from fusion import LogError, ParameterError, PluginError
+from fusion.cli.arguments import not_negative
+from fusion.cli.options import parse_options
+from logs.reader import read_run
+
+
+def replay(
+    run: Path,
+    estimator: str,
+    output: Path | None = None,
+    *,
+    options: Mapping[str, object] | None = None,
+    seed: int = 0,
+    verify: Path | None = None,
+) -> str:
+    """Fold ``run`` through ``estimator`` and answer the digest of all it said.
+
+    ``output``: a new log with the measurements and truth of ``run`` and the estimates and Fates as channels; the same
+    arguments give the same bytes. ``verify``: an earlier replay whose digest must be the same. Raises `LogError`,
+    `PluginError` or `ParameterError`.
+    """
+    if output is not None and output.resolve() == run.resolve():
+        raise LogError(f"{output}: this is the log being replayed; give the output another name")
+    recorded = cached_run(run)
+    fusion.build(estimator, recorded.world, options)
+    lane = run_lane(recorded, estimator, options, seed)
+    if lane.error is not None:
+        raise PluginError(f"{estimator} did not survive {run}: {lane.error}")
+    if verify is not None:
+        _verify(verify, lane)
+    if output is not None:
+        certificate = {"digest": lane.digest, "estimator": estimator, "seed": str(seed)}
+        certificate["parameters"] = json.dumps(dict(options or {}), sort_keys=True)
+        write_replay(recorded, lane, output, {**recorded.metadata, **certificate})
+    return lane.digest
+
+
+def _verify(earlier: Path, lane: Lane) -> None:
+    metadata = read_run(earlier).metadata
+    kept = metadata.get("digest") or json.loads(metadata.get("live_digests", "{}")).get(lane.name)
+    if kept is None:
+        raise LogError(
+            f"{earlier}: holds no digest of {lane.name}; give a log that `fusion replay` or `fusion live -o` wrote"
+        )
+    if kept != lane.digest:
+        raise LogError(
+            f"{earlier}: its digest is {kept}, this replay's is {lane.digest}; compare seed, parameters and versions"
+        )
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion replay``."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="an MCAP log")
+    parser.add_argument("--estimator", required=True, metavar="NAME", help="`fusion estimators` lists them")
+    parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="the log to write")
+    parser.add_argument("--seed", type=not_negative, default=0, help="of an estimator that draws random numbers")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="a parameter of the estimator; repeatable"
+    )
+    parser.add_argument("--verify", type=Path, metavar="LOG", help="fail unless this earlier replay said the same")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Replay, and print the digest."""
+    if arguments.output is None and arguments.verify is None:
+        raise ParameterError("nothing to do with what the estimator says; give -o OUT.mcap, --verify LOG or both")
+    digest = replay(
+        arguments.run,
+        arguments.estimator,
+        arguments.output,
+        options=parse_options(arguments.set),
+        seed=arguments.seed,
+        verify=arguments.verify,
+    )
+    for warning in cached_run(arguments.run).warnings:
+        sys.stderr.write(f"fusion replay: {warning}\n")
+    sys.stdout.write(f"{digest}\n")
+    return 0

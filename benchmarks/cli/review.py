@@ -1,0 +1,114 @@
+"""``fusion review``: a run and its estimators in Rerun, and where to look first."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from benchmarks.review.listing import told
+from benchmarks.review.review import PREFIX, SCENE, review
+from benchmarks.review.reviewed_run import remarks, subject
+from benchmarks.review.scene import SUFFIX
+from benchmarks.review.window import serve_web
+from fusion import ParameterError
+from fusion.cli.arguments import at_least_one, not_negative, since_start
+from fusion.cli.options import parse_settings
+from fusion.plugins import left_out
+from logs.cli.import_ import bag_options
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion review``."""
+    subject_options(parser)
+    parser.add_argument("--estimators", metavar="A,B", help="names, separated by commas; all installed by default")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME.KEY=VALUE", help="a parameter of an estimator; repeatable"
+    )
+    parser.add_argument(
+        "--save", type=Path, metavar="OUT", help="write OUT.rrd for the Rerun viewer, or a folder of one file a layer"
+    )
+    parser.add_argument("--png", type=Path, metavar="OUT.png", help="write a picture; needs no display")
+    parser.add_argument("--web", action="store_true", help="show it in a browser on this machine, until interrupted")
+    parser.add_argument("--at", type=since_start, metavar="S", help="time cursor, since the start; the end by default")
+    parser.add_argument(
+        "--worst", type=at_least_one, default=0, metavar="K", help="list the K worst moments of each estimator"
+    )
+    parser.add_argument(
+        "--without", action="append", default=[], metavar="ANCHOR", help="what if it had never been heard; repeatable"
+    )
+    parser.add_argument(
+        "--reject",
+        action="append",
+        type=since_start,
+        default=[],
+        metavar="S",
+        help="what if the radio measurement nearest to that time had been refused; repeatable",
+    )
+    parser.add_argument("--seed", type=not_negative, default=0, help="of the estimators that draw random numbers")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Draw, and say where to; list the worst moments."""
+    if arguments.web and arguments.save is not None and arguments.save.suffix != SUFFIX:
+        # The web viewer forgets the layout when a second file follows the one that brings it.
+        raise ParameterError(f"--web shows one file, not a folder of layers; give --save {arguments.save}{SUFFIX}")
+    settings, recorded = parse_settings(arguments.set), subject(arguments)
+    for remark in (*remarks(recorded), *(left_out() if arguments.estimators is None else ())):
+        sys.stderr.write(f"fusion review: {remark}\n")
+    with tempfile.TemporaryDirectory(prefix=PREFIX) as folder:
+        made = review(
+            recorded,
+            estimators=None if arguments.estimators is None else arguments.estimators.split(","),
+            settings=settings,
+            save=arguments.save or (Path(folder, SCENE) if arguments.web else None),
+            png=arguments.png,
+            at_s=arguments.at,
+            worst=arguments.worst,
+            without=arguments.without,
+            reject_s=arguments.reject,
+            seed=arguments.seed,
+        )
+        for written in ([] if arguments.save is None else made.files) + [arguments.png] * (arguments.png is not None):
+            sys.stdout.write(f"{written}\n")
+        sys.stdout.writelines(told(made.moments, [*words(arguments)], settings, arguments.seed))
+        if arguments.web:
+            _serve(made.files, arguments.at)
+    return 0
+
+
+def _serve(files: Sequence[Path], at_s: float | None) -> None:
+    """Until the server ends, or the user ends it."""
+    with serve_web(files) as served:
+        sys.stdout.write(f"{served.address}\n")
+        sys.stdout.flush()
+        if at_s is not None:
+            # The web viewer takes no time from outside.
+            sys.stderr.write(f"fusion review: the page opens at the start; move its time cursor to {at_s:g} s\n")
+        sys.stderr.write("fusion review: serving that page until interrupted (Ctrl-C)\n")
+        try:
+            served.process.wait()
+        except KeyboardInterrupt:
+            return
+
+
+def subject_options(parser: argparse.ArgumentParser) -> None:
+    """Which run, and what a foreign one does not say by itself."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="an MCAP log, a ROS 2 bag, or with --suite a run's id")
+    bag_options(parser.add_argument_group("a ROS 2 bag that is no log of ours (docs/import.md)"))
+    parser.add_argument("--suite", type=Path, metavar="SUITE", help="RUN is the id of a run of this suite")
+
+
+def words(arguments: argparse.Namespace) -> Iterator[str]:
+    """The run as it was asked for, to be asked for again."""
+    yield str(arguments.run)
+    if arguments.suite is not None:
+        yield from ("--suite", str(arguments.suite))
+    if arguments.world is not None:
+        yield from ("--world", str(arguments.world))
+    for topic in arguments.topic:
+        yield from ("--topic", topic)
+    if arguments.truth_to_map is not None:
+        yield from ("--truth-to-map", *(f"{number:g}" for number in arguments.truth_to_map))

@@ -1,0 +1,113 @@
+"""What can go wrong with a recorded run: faults by name, read from a suite and written into a copy of the run.
+
+Only what was measured is rewritten, and for `BadStart` the start; log, truth and world stay as they are. Every
+estimator meets the same draw: chance comes from the suite's seed, the run, the fault and the seed of the repetition,
+never from the estimator. A second fault leaves the draws of the first as they were; a fault with a greater ``p`` or
+spread strikes what the milder one strikes, and more or harder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from benchmarks.faults.fault import Fault
+from benchmarks.faults.message_faults import Clock, Delay, Drop, GyroDrop
+from benchmarks.faults.motion_faults import BadStart, Freeze, GyroBias, Kidnap, Slip
+from benchmarks.faults.radio_faults import Nlos, Outlier, PowerStep, RssiNoise
+from benchmarks.faults.row_selection import Windows
+from benchmarks.faults.run_columns import Tape
+from fusion import ParameterError, WorldError
+from fusion.errors import did_you_mean
+from fusion.schema import read_record
+from logs.run import Run
+
+KINDS: Mapping[str, type[Fault]] = {
+    fault.kind: fault
+    for fault in (
+        Drop,
+        RssiNoise,
+        PowerStep,
+        Nlos,
+        Outlier,
+        Delay,
+        Clock,
+        Slip,
+        Freeze,
+        GyroBias,
+        GyroDrop,
+        Kidnap,
+        BadStart,
+    )
+}
+FAULT_STREAM = 1
+"""First number of every key of random numbers that belong to faults; those of estimators have another."""
+
+
+def read_fault(table: object, where: str) -> Fault:
+    """A fault from its TOML table, ``{kind = "drop", topic = "wifi", source = "ap2", windows = [[20, 50]]}``; raises
+    `ParameterError` that names ``where``.
+    """
+    if not isinstance(table, Mapping):
+        raise ParameterError(f'{where}: expected a table such as {{kind = "drop", topic = "wifi"}}, got {table!r}')
+    options = {key: value for key, value in table.items() if key != "kind"}
+    kind = str(table.get("kind"))
+    if kind not in KINDS:
+        raise ParameterError(f"{where}: there is no kind of fault {kind!r}; {did_you_mean(kind, KINDS)}")
+    try:
+        return read_record(KINDS[kind], options, f"{where} ({kind})")
+    except WorldError as error:  # the reader of world files, at work on something else
+        raise ParameterError(str(error)) from error
+
+
+def apply_faults(run: Run, faults: Sequence[Fault], *, suite_seed: int, fault_id: str, seed: int) -> Run:
+    """``run`` with all ``faults``, which together are called ``fault_id``, in the order given; ``seed`` counts the
+    repetitions. Raises `ParameterError` for a topic, source or wheel that the run does not have.
+    """
+    return struck(run, faults, suite_seed=suite_seed, fault_id=fault_id, seed=seed).told()
+
+
+def struck(run: Run, faults: Sequence[Fault], *, suite_seed: int, fault_id: str, seed: int) -> Tape:
+    """The columns of ``run`` with the faults written into them; of what `apply_faults` does, all that it can refuse."""
+    tape = Tape(run)
+    struck: Counter[str] = Counter()
+    for fault in faults:
+        key = fault_seed(suite_seed, run.name, fault_id, seed)
+        own = (*key.spawn_key, stable_hash(fault.place), struck[fault.place])
+        random = np.random.Generator(np.random.PCG64(np.random.SeedSequence(suite_seed, spawn_key=own)))
+        struck[fault.place] += 1
+        try:
+            fault.strike(tape, random)
+        except ParameterError as error:
+            raise ParameterError(f"fault {fault_id!r} ({fault.kind}) on run {run.name!r}: {error}") from error
+    return tape
+
+
+def outages(faults: Sequence[Fault]) -> Windows:
+    """When any of ``faults`` that do not last the whole run strikes, in order; those that overlap or touch are one."""
+    merged: list[tuple[float, float]] = []
+    for begin, end in sorted(window for fault in faults for window in fault.lasts):
+        if merged and begin <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(end, merged[-1][1]))
+        else:
+            merged.append((begin, end))
+    return tuple(merged)
+
+
+def fault_seed(suite_seed: int, run: str, fault: str, seed: int) -> np.random.SeedSequence:
+    """The randomness of all faults called ``fault`` on ``run``; raises `ParameterError` for a negative seed."""
+    if suite_seed < 0 or seed < 0:
+        raise ParameterError(f"seeds {suite_seed} and {seed}: must not be negative; give 0, 1, 2 ...")
+    return np.random.SeedSequence(suite_seed, spawn_key=(FAULT_STREAM, stable_hash(run), stable_hash(fault), seed))
+
+
+def stable_hash(text: str) -> int:
+    """The first eight bytes of SHA-256, most significant first; Python's own ``hash`` differs from process to process.
+
+    >>> stable_hash("ap2-out")
+    8665761871651810444
+    """
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")

@@ -1,0 +1,192 @@
+"""How the answers came and went: convergence, failures and recovery, silence, where on the floor there were any.
+
+A stretch of instants lasts from its first to its last one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.metrics.drift import theil_sen
+from benchmarks.metrics.errors import Errors
+from fusion.arrays import Flags, Whole
+from fusion.quantiles import mean, quantile
+from fusion.values import NANOSECONDS, nanoseconds
+
+CONVERGED_M, CONVERGED_S = 1.0, 5.0
+"""Converged: no further off than this for so long."""
+FAILED_M, FAILED_S = 3.0, 2.0
+"""Failed: further off than this, or without an answer, for so long."""
+CELL_M = 1.0
+COVERED = 0.95
+"""A cell of the floor is covered when this share of its instants has a valid answer."""
+
+
+class Stretches(NamedTuple):
+    """Index of the first and the last instant of each of k stretches, (k,)."""
+
+    first: Whole
+    last: Whole
+
+    def lasting(self, time_ns: Whole, least_s: float) -> Stretches:
+        """Those that last ``least_s`` or longer."""
+        if len(self.first) == 0:
+            return self
+        long = time_ns[self.last] - time_ns[self.first] >= nanoseconds(least_s)
+        return Stretches(self.first[long], self.last[long])
+
+
+NONE = Stretches(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+
+
+def stretches(mask: Flags, starts: Sequence[int] = (0,)) -> Stretches:
+    """The longest stretches of instants where ``mask`` (n,) is True, none reaching over ``starts`` of runs."""
+    changed = mask[1:] != mask[:-1]
+    changed[[start - 1 for start in starts[1:]]] = True
+    breaks = changed.nonzero()[0] + 1
+    if len(breaks) == 0:
+        return Stretches(np.array([0]), np.array([len(mask) - 1])) if mask[:1].any() else NONE
+    first = np.concatenate([[0], breaks])
+    last = np.concatenate([breaks - 1, [len(mask) - 1]])
+    kept = mask[first]
+    return Stretches(first[kept], last[kept])
+
+
+def dynamic_metrics(measured: Errors) -> dict[str, float]:
+    """All of this module that needs no windows; NaN without instants."""
+    return {**convergence_metrics(measured), **failure_metrics(measured), **silence_metrics(measured)}
+
+
+def convergence_metrics(measured: Errors) -> dict[str, float]:
+    """``t_conv`` [s] from the first instant of a run to when it has converged, ``t_conv_share`` of the runs that do.
+
+    Over several runs the Kaplan-Meier median; infinite when half of them never do before they end.
+    """
+    instants = measured.instants
+    near = stretches(measured.position <= CONVERGED_M, instants.starts)
+    held = near.lasting(instants.time_ns, CONVERGED_S).first.tolist()
+    times, reached = [], []
+    for start, beyond in pairwise((*instants.starts, len(instants))) if len(instants) else ():
+        own = [first for first in held if start <= first < beyond]
+        times.append(float(instants.time_ns[own[0] if own else beyond - 1] - instants.time_ns[start]) / NANOSECONDS)
+        reached.append(len(own) > 0)
+    share = sum(reached) / len(reached) if reached else math.nan
+    return {"t_conv": kaplan_meier_median(times, reached), "t_conv_share": share}
+
+
+def kaplan_meier_median(times: list[float], reached: list[bool]) -> float:
+    """The time by which half have reached their end, those not ``reached`` being watched only up to theirs.
+
+    Kaplan & Meier 1958; infinite when the estimated share left never falls to one half, NaN of nothing.
+    """
+    if not times:
+        return math.nan
+    left = 1.0
+    for time in sorted(set(times)):
+        watched = sum(other >= time for other in times)
+        ended = sum(done and other == time for other, done in zip(times, reached, strict=True))
+        left *= 1.0 - ended / watched
+        if left <= 0.5:
+            return time
+    return math.inf
+
+
+def failure_metrics(measured: Errors) -> dict[str, float]:
+    """``failures``, and the worst of all of them: ``t_recover`` [s] from the end of one until converged again, infinite
+    if never; ``max_in_outage`` [m], the greatest error of a valid answer inside it; ``growth`` [m/s], the Theil-Sen
+    slope of the error inside it. NaN where there was none.
+    """
+    failed = stretches(measured.position > FAILED_M, measured.instants.starts).lasting(measured.time_ns, FAILED_S)
+    ends_ns = measured.time_ns[failed.last]
+    spans = zip(failed.first.tolist(), (failed.last + 1).tolist(), ends_ns.tolist(), strict=True)
+    return {"failures": float(len(failed.first)), **_worst([_outage(measured, *span) for span in spans])}
+
+
+def fault_metrics(measured: Errors, start_ns: int, windows: Sequence[tuple[float, float]]) -> dict[str, float]:
+    """What a fault did in its ``windows`` [begin, end), seconds from ``start_ns``, of a single run.
+
+    ``fault_availability`` is the share of the instants inside with a valid answer; NaN where instants have weights, for
+    there nothing says what was left out. ``fault_t_recover``, ``fault_max_in_outage`` and ``fault_growth`` are the
+    worst over windows of what `failure_metrics` says of failures; a window that the run does not outlast has no
+    recovery. All NaN without an instant inside.
+    """
+    elapsed_s = (measured.time_ns - start_ns) / NANOSECONDS
+    outages, asked = [], [np.empty(0)]
+    for begin_s, end_s in windows:
+        first, beyond = np.searchsorted(elapsed_s, (begin_s, end_s)).tolist()
+        if first < beyond:
+            end_ns = start_ns + nanoseconds(end_s) if beyond < len(elapsed_s) else None
+            outages.append(_outage(measured, first, beyond, end_ns))
+            asked.append(measured.position[first:beyond])
+    available = mean(np.isfinite(np.concatenate(asked))) if measured.weight is None else math.nan
+    return {"fault_availability": available, **{f"fault_{name}": value for name, value in _worst(outages).items()}}
+
+
+class Outage(NamedTuple):
+    """What one failure or fault did; NaN is what cannot be said."""
+
+    t_recover: float
+    max_in_outage: float
+    growth: float
+
+
+def _worst(outages: Sequence[Outage]) -> dict[str, float]:
+    """The greatest of each, by name."""
+    known = np.array([Outage(math.nan, math.nan, math.nan), *outages])
+    return dict(zip(Outage._fields, np.fmax.reduce(known).tolist(), strict=True))
+
+
+def _outage(measured: Errors, first: int, beyond: int, end_ns: int | None) -> Outage:
+    """Of the instants from ``first`` up to ``beyond``; ``end_ns`` is when it ended, None if not before the run did."""
+    inside = measured.position[first:beyond]
+    valid = np.isfinite(inside)
+    seconds = (measured.time_ns[first:beyond][valid] - measured.time_ns[first]) / NANOSECONDS
+    peak = float(inside[valid].max()) if valid.any() else math.nan
+    recovered = math.nan if end_ns is None else _recovery_s(measured, beyond, end_ns)
+    return Outage(recovered, peak, theil_sen(seconds, inside[valid]))
+
+
+def _recovery_s(measured: Errors, beyond: int, end_ns: int) -> float:
+    """From ``end_ns`` until converged, sought from the instant ``beyond`` to the end of its run; infinite if never."""
+    rest = slice(beyond, measured.instants.end_of_run(beyond - 1))
+    rest_ns = measured.time_ns[rest]
+    held = stretches(measured.position[rest] <= CONVERGED_M).lasting(rest_ns, CONVERGED_S)
+    return float(rest_ns[held.first[0]] - end_ns) / NANOSECONDS if len(held.first) else math.inf
+
+
+def silence_metrics(measured: Errors) -> dict[str, float]:
+    """``age_p95`` [s] of the newest answer; ``dropouts``: stretches without a valid answer, and ``dropout_s``, how
+    long all of them last, each up to the next answer; ``coverage``: share of the 1 m² cells of the floor the truth
+    visits that are covered.
+    """
+    count = len(measured.position)
+    if count == 0:
+        return dict.fromkeys(("age_p95", "dropouts", "dropout_s", "coverage"), math.nan)
+    valid = np.isfinite(measured.position)
+    silent = stretches(~valid, measured.instants.starts)
+    return {
+        "age_p95": quantile(measured.age_s, 0.95),
+        "dropouts": float(len(silent.first)),
+        "dropout_s": _silence_s(measured, silent) if len(silent.first) else 0.0,
+        "coverage": _coverage(measured, valid),
+    }
+
+
+def _silence_s(measured: Errors, silent: Stretches) -> float:
+    after = np.minimum(silent.last + 1, len(measured.run) - 1)
+    after = np.where(measured.run[after] == measured.run[silent.last], after, silent.last)
+    return float((measured.time_ns[after] - measured.time_ns[silent.first]).sum()) / NANOSECONDS
+
+
+def _coverage(measured: Errors, valid: Flags) -> float:
+    if valid.all():
+        return 1.0
+    column, row = np.floor(measured.instants.x / CELL_M), np.floor(measured.instants.y / CELL_M)
+    _, cell = np.unique(column + 1j * row, return_inverse=True)
+    answered = np.bincount(cell, weights=valid) / np.bincount(cell)
+    return float(np.count_nonzero(answered >= COVERED) / len(answered))

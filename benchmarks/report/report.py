@@ -1,0 +1,245 @@
+"""``fusion bench report``: the results of a suite as one page that a reviewer would accept."""
+
+from __future__ import annotations
+
+import platform
+import shlex
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+import fusion
+from benchmarks.metrics.credibility import LEAST_SEEDS
+from benchmarks.report import tables
+from benchmarks.report.accuracy_figures import accuracy, cost, over_time
+from benchmarks.report.cell_links import SCRIPT, counted, entries
+from benchmarks.report.consistency import consistency
+from benchmarks.report.figure_panel import POINTING, Panel, group
+from benchmarks.report.innovations import innovations
+from benchmarks.report.maps import maps
+from benchmarks.report.pairs import deciding, pairs, run_by_run
+from benchmarks.report.report_data import Material
+from benchmarks.report.sensitivity import advice, curves, sensitivity, sweeps
+from benchmarks.runner.results import judged, record, warnings
+from benchmarks.runner.suite import CLEAN, TUNE
+from benchmarks.statistics.block_bootstrap import LEAST_INSTANTS, within_run
+from fusion.output.figures import require_matplotlib
+from fusion.output.html import as_html
+from fusion.output.tables import Sheet, as_code, as_markdown
+
+WITHIN_RUN = ("pos_p75", 0.75)
+"""The quantile that is compared within one run; its instants have no other score."""
+
+ABOUT = (
+    "Errors are horizontal distances to the truth, raw: nothing is aligned. An instant without a valid answer counts "
+    "as infinite. Every number that is a link, and every point of a figure, leads to the cell it comes from, with the "
+    "command that opens Rerun where that cell erred most; a point of a curve or a track to that of its own moment."
+)
+
+
+def report(material: Material, *, limit: bool = False) -> str:
+    """The page as Markdown with its figures in it; with ``limit`` also how far from the physical limit all are."""
+    suite = material.suite
+    counts = ((len(suite.runs), "run"), (len(material.contestants), "estimator"), (len(suite.faults) - 1, "fault"))
+    made = ", ".join(counted(*count) for count in (*counts, (suite.seeds, "seed")))
+    parts = [
+        f"# {suite.name}",
+        *_verdicts(material),
+        f"{made}: {counted(len(material.results), 'cell')}. {ABOUT}",
+        *_about_runs(material),
+        *_sections(material, limit=limit),
+        *_sensitivity(material),
+        *_provenance(material),
+        "**Cells**",
+        entries(material),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _about_runs(material: Material) -> Iterator[str]:
+    """What is wrong with runs, and which do not count, and why."""
+    yield from (f"**Warning**: {as_code(warning)}" for warning in warnings(material.results))
+    if blind := sorted({result.cell.run.id for result in material.results if not result.cell.content.truth}):
+        yield f"Without ground truth, and so without an error: {', '.join(blind)}."
+    counting = {result.cell.run.id for result in judged(material.results)}
+    if material.scored_runs and (len(counting) > len(material.scored_runs) or material.suite.seeds > 1):
+        named = ", ".join(material.scored_runs)
+        yield f"Curves over instants, maps and mean NIS are of the first seed of the first runs that count: {named}."
+    tune = [run.id for run in material.suite.runs if run.split == TUNE]
+    if len(tune) == len(material.suite.runs):
+        yield "**All runs are for tuning**: parameters may have been chosen on what they are scored on here."
+    elif tune:
+        named = ", ".join(tune)
+        yield f"Only for tuning, and in no number but those of the parameters and of their own cells: {named}."
+
+
+def as_page(material: Material, *, limit: bool = False) -> bytes:
+    """The report as one HTML file, with the numbers that make it a baseline for `fusion bench gate`; raises
+    `FusionError` without matplotlib or markdown-it.
+    """
+    require_matplotlib()
+    clean = [result for result in material.results if result.cell.fault.id == CLEAN]
+    page = report(material, limit=limit)
+    return as_html(material.suite.name, page, SCRIPT + POINTING, record(material.suite, clean))
+
+
+def _verdicts(material: Material) -> Iterator[str]:
+    """The best against every other, in sentences."""
+    if material.comparison is None:
+        yield "Nothing can be compared here: give at least two estimators, and runs with truth."
+        return
+    best = material.contestants[0]
+    told = [
+        f"{verdict.sentence} ([where](#{material.anchor(deciding(material, verdict))}))"
+        for verdict in material.comparison.verdicts
+        if best in (verdict.first, verdict.second)
+    ]
+    yield "\n".join(f"- {sentence}" for sentence in told + _within_the_run(material))
+
+
+def _within_the_run(material: Material) -> list[str]:
+    """Where one run is all there is: what it says of itself, of the best against every other."""
+    if len(material.scored_runs) != 1:
+        return []
+    errors = {name: series.error_m for (_, name), series in material.series.items()}
+    best, *others = (name for name in material.contestants if name in errors)
+    if len(errors[best]) < LEAST_INSTANTS:
+        return []
+    return [within_run(best, other, errors, *WITHIN_RUN).sentence for other in others]
+
+
+def _sections(material: Material, *, limit: bool) -> Iterator[str]:
+    """Who is better, how honest all are, where and when they err, what it costs, and what breaks them."""
+    yield _table(tables.leaderboard(material), "leaderboard")
+    if material.comparison is not None:
+        yield _table(pairs(material, material.comparison), "pairs")
+    yield from _figure(material, "accuracy")
+    if material.comparison is not None:
+        yield as_markdown(run_by_run(material))
+    yield from _figure(material, "consistency")
+    yield from _known(innovations(material), "innovations")
+    yield from _figure(material, "over_time")
+    yield from _figure(material, "maps")
+    yield from _known(tables.moments(material))
+    yield from _known(tables.lost(material))
+    yield from _figure(material, "cost")
+    if limit and material.scored_runs:
+        yield as_markdown(tables.limits(material))
+        yield as_markdown(tables.fixes(material))
+    if len(material.suite.faults) > 1:
+        yield from _under_faults(material)
+
+
+def _under_faults(material: Material) -> Iterator[str]:
+    yield _table(tables.faults(material), "faults")
+    yield from _known(tables.outages(material), "outages")
+    if material.suite.seeds >= LEAST_SEEDS and material.scored_runs:
+        yield _table(tables.credibility(material), "credibility")
+
+
+def _table(sheet: Sheet, name: str = "") -> str:
+    """A table with what there is to know of it."""
+    return as_markdown(sheet) + (f"\n\n{NOTES[name]}" if name else "")
+
+
+def _known(sheet: Sheet, name: str = "") -> Iterator[str]:
+    """The same, where it has rows."""
+    if sheet.rows:
+        yield _table(sheet, name)
+
+
+def _figure(material: Material, name: str) -> Iterator[str]:
+    """Its panels, where there is anything to draw."""
+    if material.has_errors and (panels := list(FIGURES[name](material))):
+        yield f"{group(panels)}\n\n{NOTES[name]}"
+
+
+def _sensitivity(material: Material) -> Iterator[str]:
+    """Nothing without a grid, or where nothing was scored."""
+    found = sweeps(material) if material.has_errors else []
+    if found:
+        yield as_markdown(sensitivity(material, found))
+        yield "\n".join(f"- {sentence}" for sentence in advice(found))
+        yield f"{group(curves(material, found))}\n\n{NOTES['parameters']}"
+
+
+def _provenance(material: Material) -> Iterator[str]:
+    command = shlex.join(["fusion", "bench", "run", *material.words])
+    yield as_markdown(tables.provenance(material))
+    yield as_markdown(tables.contestants(material))
+    if material.suite.left_out:
+        yield f"Left out: {'; '.join(material.suite.left_out)}."
+    yield from _known(tables.damage(material))
+    yield (
+        f"fusion {fusion.__version__}, numpy {np.__version__}, Python {platform.python_version()}. Every cell is made "
+        f"again by `{command}`; `fusion bench verify` computes a sample anew and compares it to the bit."
+    )
+
+
+NOTES: Mapping[str, str] = {
+    "leaderboard": (
+        "Estimators that share a letter under `alike` cannot be told apart. Over runs: geometric mean with its 95 % t "
+        "interval. Worst run: the highest score of all. All other numbers are medians over cells. p75: three quarters "
+        "of the instants err less. Quantiles count every instant; RMSE, mean and max only those with a valid answer, "
+        "so read them with the availability, the share of such instants; heading errors only those whose true heading "
+        "is known (`head_n` of the exported numbers)."
+    ),
+    "pairs": (
+        "Ratio of the first to the second: geometric mean over runs with its 95 % t interval, below 1 where the first "
+        "is better. `p, Holm` decides, at 5 %; it is the p of that mean, or of the signed ranks where one of the two "
+        "was lost in a run, corrected for the number of pairs. Intervals and `p, signed ranks` are of each pair alone. "
+        "The runs that a verdict says are needed, and the differences that it says so many runs show, are those that "
+        "four of five such suites would find."
+    ),
+    "innovations": (
+        "NIS: squared innovation of a reading over its predicted variance; refused readings count too. Inside 95 %: "
+        "share of readings below the 95 % point of chi-square, median over cells. Bold lies outside its band."
+    ),
+    "faults": (
+        "Every estimator meets the same damage. ∞: no finite score in at least half of the runs. Below 1 is no "
+        "mistake: a reading that is missing cannot mislead, and what is drawn anew may fall better."
+    ),
+    "outages": (
+        "Growth: slope of the error over time. Below 1 m again: from the end of the window until the error stays below "
+        "1 m for 5 s; ∞ where the run ends before that, in at least half of the cells."
+    ),
+    "credibility": (
+        "nci: mean of 10 |log₁₀(ν / ν*)|, incl the same without the bars; ν is the squared error over the claimed "
+        "covariance, ν* over the actual mean square of the seeds' errors (Li & Zhao 2006)."
+    ),
+    "accuracy": (
+        "Curves: of all instants of the shown runs the share that errs less; they end at the availability, for an "
+        "instant without a valid answer is below no error. Verdicts rest on what happens along the grey lines, one per "
+        "run."
+    ),
+    "consistency": (
+        "A dot lies inside its grey band, a cross outside; an honest filter's mean lies inside with 95 %. The band "
+        "takes as many independent samples as those of the mean are worth, which correlate in time; it is "
+        "approximate. ANEES: squared error of the pose over its claimed covariance, per dimension, in every cell "
+        "without faults. An estimator that claims no covariance, or predicts no readings, has no row. At 10 errors "
+        "are about three times what was claimed, at 0.1 a third of it."
+    ),
+    "over_time": (
+        "Lines are named below the first panel, and below any where they are pointed at. Gaps are instants without a "
+        "valid answer; errors below 1 cm are not shown, unless all are small. Where a line has more points than can "
+        "be drawn, the greatest of neighbours stands for all of them."
+    ),
+    "maps": (
+        "The best estimator's track, coloured by its error, over the true path; triangles are anchors, contours the "
+        "least error of a fix from one reading of each (Cramér-Rao)."
+    ),
+    "parameters": (
+        "Below 1 is better than the default. A grey line is a run, dashed where it is for tuning; bars are the 95 % "
+        "interval over the test runs."
+    ),
+    "cost": "Measured alone on one machine by `fusion bench time`. Lower left is better.",
+}
+
+
+FIGURES: Mapping[str, Callable[[Material], Iterator[Panel]]] = {
+    "accuracy": accuracy,
+    "consistency": consistency,
+    "over_time": over_time,
+    "maps": maps,
+    "cost": cost,
+}

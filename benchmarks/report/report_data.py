@@ -1,0 +1,188 @@
+"""What a report is made of: the results of a suite, and for its figures the errors of the clean cells of one seed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.cell import ALIVE
+from benchmarks.limits.fix_bound import Places, Radio, fix_error
+from benchmarks.metrics.catalogue import RANKED_BY, Unit, unit_of
+from benchmarks.metrics.errors import Errors, errors
+from benchmarks.metrics.fates import FateColumns
+from benchmarks.metrics.matching import Answers, match
+from benchmarks.review.frame import Frame
+from benchmarks.runner.execute import stored_track
+from benchmarks.runner.results import Result, by_contestant, comparison, judged, median_metrics
+from benchmarks.runner.run_source import open_run
+from benchmarks.runner.store import STORE, Store
+from benchmarks.runner.suite import CLEAN, Suite
+from benchmarks.runner.timing import read_timing
+from benchmarks.statistics.verdict import Comparison
+from fusion import ParameterError, Ranges
+from fusion.arrays import Floats
+from fusion.values import NANOSECONDS
+from logs.run import Run
+from logs.truth import Instants, evaluation_instants
+
+SHOWN_RUNS = 6
+"""Runs that get panels of their own."""
+
+
+class Series(NamedTuple):
+    """One cell over its run, which starts at ``start_ns``: position error [m], infinite without a valid answer."""
+
+    result: Result
+    start_ns: int
+    instants: Instants
+    answers: Answers
+    fates: FateColumns
+
+    @property
+    def is_scored(self) -> bool:
+        """Whether the cell was not lost."""
+        return self.result.status in ALIVE
+
+    @property
+    def time_s(self) -> Floats:
+        """Of the instants since the start of the run: what `fusion review` calls ``--at``."""
+        return (self.instants.time_ns - self.start_ns) / NANOSECONDS
+
+    @property
+    def error_m(self) -> Floats:
+        """Horizontal distances."""
+        away = np.hypot(self.answers.x - self.instants.x, self.answers.y - self.instants.y)
+        return np.where(self.answers.valid, away, np.inf)
+
+
+def radio_of(run: Run) -> Radio:
+    """What a fix of this run is made of: ranges, where it has any."""
+    return "range" if any(isinstance(measurement, Ranges) for measurement in run.measurements) else "rssi"
+
+
+class Material:
+    """A suite, its results, and what follows from them; everything is computed when first asked for."""
+
+    def __init__(self, suite: Suite, results: Sequence[Result], store: Store, metric: str = RANKED_BY) -> None:
+        self.suite, self.results, self.metric = suite, list(results), metric
+        self._store = store
+        self._runs: dict[str, Run] = {}
+        self._starts_ns: dict[str, int] = {}
+
+    @property
+    def words(self) -> list[str]:
+        """What names suite and store on a command line."""
+        store = self._store.folder
+        return [self.suite.word, *([] if store == STORE else ["--store", str(store.resolve())])]
+
+    def anchor(self, result: Result) -> str:
+        """What links to the entry of a cell name."""
+        return self._anchors[_ids(result)]
+
+    def use(self, contestant: str) -> str:
+        """The installed name of its estimator, which has the colour."""
+        return next(one.use for one in self.suite.contestants if one.id == contestant)
+
+    def anchor_of_all(self, contestant: str) -> str:
+        """What links to all cells of a contestant name."""
+        return f"all-{self.contestants.index(contestant)}"
+
+    @cached_property
+    def _anchors(self) -> dict[tuple[str, str, str, int], str]:
+        return {_ids(result): f"cell-{number}" for number, result in enumerate(self.results)}
+
+    @property
+    def unit(self) -> Unit:
+        """Of what is compared."""
+        return unit_of(self.metric)
+
+    @property
+    def axis(self) -> str:
+        """What is compared, for an axis."""
+        return ", ".join(filter(None, (self.metric, self.unit.name)))
+
+    def text(self, value: float) -> str:
+        """A value of what is compared, with its unit."""
+        return f"{self.unit.number(value)} {self.unit.name}".rstrip()
+
+    @cached_property
+    def contestants(self) -> list[str]:
+        """The best first."""
+        grouped = by_contestant(self.results)
+        return sorted(grouped, key=lambda name: (median_metrics(grouped[name]).get(self.metric, np.inf), name))
+
+    @cached_property
+    def comparison(self) -> Comparison | None:
+        """All pairs; None where nothing can be compared, such as runs without truth."""
+        if len(self.contestants) < 2 or not self.scored_runs:
+            return None
+        try:
+            return comparison(self.results, self.metric)
+        except ParameterError:
+            return None
+
+    @cached_property
+    def timing(self) -> dict[str, float]:
+        """µs per measurement by contestant, empty when it was never measured."""
+        return read_timing(self._store.folder)
+
+    @cached_property
+    def scored_runs(self) -> list[str]:
+        """The first runs that count and have truth."""
+        known = {result.cell.run.id for result in judged(self.results) if "availability" in result.metrics}
+        return [run.id for run in self.suite.runs if run.id in known][:SHOWN_RUNS]
+
+    @cached_property
+    def has_errors(self) -> bool:
+        """Whether there is anything to draw: an estimator that answered, in a run with truth."""
+        return any(result.worst_at_s is not None for result in judged(self.results))
+
+    @cached_property
+    def series(self) -> dict[tuple[str, str], Series]:
+        """Clean cells of the first seed, by run and contestant, of the runs that are shown."""
+        found = {}
+        for result in self.results:
+            cell = result.cell
+            if cell.fault.id == CLEAN and cell.seed == 0 and cell.run.id in self.scored_runs:
+                found[cell.run.id, cell.contestant.id] = self._series(result)
+        return found
+
+    def seeds(self, contestant: str, fault: str) -> list[list[Errors]]:
+        """Of each shown run the errors of its seeds under one fault; a crashed one answered nothing."""
+        own = by_contestant(self.results, fault).get(contestant, [])
+        of_runs = [[result for result in own if result.cell.run.id == run_id] for run_id in self.scored_runs]
+        series = [[self._series(result) for result in results] for results in of_runs]
+        return [[errors(one.instants, one.answers) for one in seeds] for seeds in series]
+
+    def fix_bound_m(self, series: Series) -> Floats:
+        """The least error of a fix from one reading of every anchor, at each instant of a cell [m]."""
+        run, true = self.run(series.result.cell.run.id), series.instants
+        return fix_error(run.world.anchors, Places.of_poses(run.world, true.x, true.y, true.heading), radio_of(run))
+
+    def run(self, run_id: str) -> Run:
+        """The run itself; those that are shown are few, and are kept."""
+        if run_id not in self._runs:
+            self._runs[run_id] = open_run(self.suite.run(run_id), self.suite.folder)
+        return self._runs[run_id]
+
+    def _start_ns(self, run_id: str) -> int:
+        if run_id not in self._starts_ns:
+            self._starts_ns[run_id] = Frame.around(self.run(run_id)).start_ns
+        return self._starts_ns[run_id]
+
+    def _series(self, result: Result) -> Series:
+        cell, rules = result.cell, result.cell.evaluation
+        truth = self.run(cell.run.id).truth
+        assert truth is not None
+        instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
+        track, fates = stored_track(cell, self._store)
+        answers = match(instants, track, max_age_s=rules.max_age_s)
+        return Series(result, self._start_ns(cell.run.id), instants, answers, fates)
+
+
+def _ids(result: Result) -> tuple[str, str, str, int]:
+    cell = result.cell
+    return cell.run.id, cell.contestant.id, cell.fault.id, cell.seed

@@ -1,0 +1,67 @@
+"""What a Dask worker does with a cell: the same as a run on one machine, in a process that the suite's limits hold for.
+
+A cell that hangs, crashes or eats memory so costs its own process alone, and the Dask worker takes the next one. Needs
+the package of Dask; `benchmarks.runner.dask_cluster` imports this where that is there.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import CancelledError
+from multiprocessing import current_process
+from pathlib import Path
+from queue import LifoQueue
+
+from distributed import Reschedule, Worker, WorkerPlugin, get_worker
+
+from benchmarks.runner.execute import carry_out, give_up
+from benchmarks.runner.plan import Cell
+from benchmarks.runner.workers import Crew, Limits
+
+Task = tuple[Cell, Path]
+IDLE_S = 60.0
+"""A process without a cell for that long ends: its run may have been killed and nobody will say that it is over."""
+
+
+class CellProcesses(WorkerPlugin):
+    """The processes of one run on one Dask worker: one per thread, kept from cell to cell until the run or it ends."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+
+    def setup(self, worker: Worker) -> None:
+        """Make ready; a process is started when there is a cell for it."""
+        # The workers of a Dask nanny are daemons, which the standard library lets have no children, lest they be left
+        # behind. Ours end with their parent.
+        current_process().daemon = False
+        self._crews = [Crew(carry_out, give_up, self._limits, IDLE_S) for _ in range(worker.state.nthreads)]
+        self._free: LifoQueue[Crew[Task, str]] = LifoQueue()
+        for crew in self._crews:
+            self._free.put(crew)
+
+    def teardown(self, worker: Worker) -> None:  # noqa: ARG002 - Dask's signature
+        """End the processes, in the middle of a cell if need be."""
+        for crew in self._crews:
+            crew.dismiss()
+
+    def carry_out(self, task: Task) -> str:
+        """Make what is missing of one cell within the limits; answers its status. Raises `CancelledError`."""
+        crew = self._free.get()
+        try:
+            ((_, status),) = crew.compute([task], workers=1)
+        finally:
+            self._free.put(crew)
+        return status
+
+
+def carry_out_here(plugin: str, task: Task) -> str:
+    """One cell on the Dask worker that this runs on, in the processes of the `CellProcesses` of that name.
+
+    A worker that is closing ends them; the cell is then somebody else's.
+    """
+    processes = get_worker().plugins.get(plugin)
+    if not isinstance(processes, CellProcesses):
+        raise Reschedule
+    try:
+        return processes.carry_out(task)
+    except CancelledError:
+        raise Reschedule from None

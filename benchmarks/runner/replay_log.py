@@ -1,0 +1,86 @@
+"""One estimator over one run as a log: measurements in the order they came in, each followed by its estimate."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+from benchmarks.metrics.estimate_track import Track
+from benchmarks.runner.estimator_run import Lane
+from benchmarks.runner.execute import faulty_run, fold
+from benchmarks.runner.plan import Cell, cells_of
+from benchmarks.runner.store import Store
+from benchmarks.runner.suite import CLEAN, Suite
+from fusion import SuiteError, Truth
+from fusion.errors import did_you_mean
+from logs.run import Run
+from logs.truth import TruthTrack
+from logs.writer import RunWriter
+
+
+def write_replay(run: Run, lane: Lane, output: Path, metadata: Mapping[str, str]) -> None:
+    """A log of the messages in the order they came in, each followed by what the estimator said to it; from where it
+    crashed on, of the messages alone.
+    """
+    truths = _truths(run.truth) if run.truth is not None else []
+    now_ns, answered = 0, 0
+    with RunWriter(output, run.world, name=run.name, prior=run.prior, metadata=metadata) as writer:
+        for update, received_ns in zip(lane.updates, Track.of(lane.updates).received_ns.tolist(), strict=True):
+            _write_until(writer, truths, received_ns)
+            # The host answers every message with one update of its own; those after it are revisions.
+            if not update.revised:
+                now_ns, answered = max(received_ns, 0), answered + 1
+                writer.write(update.measurement, log_time_ns=now_ns)
+            writer.write_update(lane.name, update)
+        for measurement in run.measurements[answered:]:
+            now_ns = max(now_ns, measurement.time_ns)
+            _write_until(writer, truths, now_ns)
+            writer.write(measurement, log_time_ns=now_ns)
+        _write_until(writer, truths, None)
+
+
+def _write_until(writer: RunWriter, truths: list[Truth], time_ns: int | None) -> None:
+    """Take the true poses up to a time, or all, off the end of ``truths``."""
+    while truths and (time_ns is None or truths[-1].time_ns <= time_ns):
+        writer.write_truth(truths.pop())
+
+
+def _truths(track: TruthTrack) -> list[Truth]:
+    """The true poses, the last one first; a heading that is not a number is not known."""
+    columns = (track.time_ns.tolist(), track.x.tolist(), track.y.tolist(), track.heading.tolist())
+    rows = zip(*columns, strict=True)
+    return [Truth(t, x, y, None if math.isnan(heading) else heading) for t, x, y, heading in rows][::-1]
+
+
+Item = TypeVar("Item")
+
+
+def one_cell(suite: Suite, store: Store, run: str, estimator: str, *, fault: str = CLEAN, seed: int = 0) -> Cell:
+    """The cell of a suite by the ids of what it is made of; raises `SuiteError` that names the nearest."""
+    contestants = _found("estimator", estimator, {one.id: one for one in suite.contestants})
+    faults = _found("fault", fault, {one.id: one for one in suite.faults})
+    if not 0 <= seed < suite.seeds:
+        raise SuiteError(f"{suite.name}: there is no seed {seed}; its seeds are 0 to {suite.seeds - 1}")
+    return cells_of(replace(suite, runs=(suite.run(run),), contestants=contestants, faults=faults), store)[seed]
+
+
+def _found(what: str, wanted: str, known: Mapping[str, Item]) -> tuple[Item]:
+    if wanted not in known:
+        raise SuiteError(f"the suite has no {what} {wanted!r}; {did_you_mean(wanted, known)}")
+    return (known[wanted],)
+
+
+def replay_cell(cell: Cell, output: Path) -> str:
+    """Fold the run of ``cell``, faults and all, through its contestant; write what was measured and said as a log, and
+    answer the digest: "" where the contestant crashed, which the log then shows up to that moment.
+    """
+    run = faulty_run(cell)
+    lane = fold(cell, run)
+    about = {"estimator": cell.contestant.use, "seed": str(cell.seed), "fault": cell.fault.id, "digest": lane.digest}
+    parameters = json.dumps(dict(cell.contestant.params), sort_keys=True)
+    write_replay(run, lane, output, {**run.metadata, **about, "parameters": parameters})
+    return lane.digest

@@ -1,0 +1,257 @@
+"""The conformance kit of drivers: what every driver promises, each promise a small hunt for a counter-example.
+
+Half of them need no device: a driver must behave where nothing is plugged in. The others play on the driver's own
+`FakeDevice`; a driver that ships none is told so. Ours and strangers' drivers alike are held against the same list,
+by `fusion check --driver NAME` or, in a test, by `run_driver_checks`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple, TypeAlias, cast
+
+from fusion.conformance.checks import Outcome, Verdict
+from fusion.driver import BootClock, DeviceInfo, Driver, DriverSpec, FakeDevice, Found, Level, Remark, Said
+from fusion.errors import ConformanceError, DependencyError, DeviceLostError, DriverError, SettingError
+from fusion.plugins import SENSORS, load
+from fusion.values import Truth, seconds
+
+Kind: TypeAlias = type[Any]
+"""A driver class."""
+NAME = "sensor-under-test"
+TRIES = 50
+"""Polls after which a device that spoke must have been heard."""
+POLL_S = 0.05
+LATE_S = 2.0
+"""How much longer than asked a poll may take: a whole Wi-Fi scan is never waited for in one."""
+
+
+class DriverPromise(NamedTuple):
+    """What must hold. ``test`` raises `ConformanceError`; ``plays``: it needs the driver's fake device."""
+
+    id: str
+    reason: str
+    test: Callable[[Kind], None]
+    plays: bool
+
+
+DRIVER_PROMISES: list[DriverPromise] = []
+
+
+def _promise(promise_id: str, reason: str, *, plays: bool = True) -> Callable[[Callable[[Kind], None]], None]:
+    def enlist(test: Callable[[Kind], None]) -> None:
+        DRIVER_PROMISES.append(DriverPromise(promise_id, reason, test, plays))
+
+    return enlist
+
+
+def run_driver_checks(name: str) -> list[Verdict]:
+    """A verdict on every promise for the installed driver ``name``; raises `PluginError` for an unknown one, and
+    `DependencyError` where a package that it needs, on its fake device too, is missing.
+    """
+    made = load(name, SENSORS)
+    return [driver_verdict(promise, made) for promise in DRIVER_PROMISES]
+
+
+def driver_verdict(promise: DriverPromise, made: Kind) -> Verdict:
+    """What one promise comes to for one driver class; raises `DependencyError` for a package that is missing."""
+    if promise.plays and not hasattr(made, "fake"):
+        return Verdict(promise.id, promise.reason, Outcome.SKIPPED, "the driver ships no fake device: fake()")
+    try:
+        promise.test(made)
+    except ConformanceError as broken:
+        return Verdict(promise.id, promise.reason, Outcome.BROKEN, str(broken))
+    except DependencyError:
+        raise  # of the machine, not of the driver: no promise is broken
+    except Exception as error:  # noqa: BLE001 - a stranger's code may fail in any way; here that is an answer
+        return Verdict(promise.id, promise.reason, Outcome.BROKEN, f"it failed: {error!r}")
+    return Verdict(promise.id, promise.reason, Outcome.KEPT)
+
+
+def _require(condition: object, counter_example: str) -> None:
+    if not condition:
+        raise ConformanceError(counter_example)
+
+
+@contextmanager
+def _playing(made: Kind) -> Iterator[tuple[Driver, FakeDevice]]:
+    with made.fake() as device:
+        driver = cast(Driver, made(NAME, device.clock, **device.settings))
+        try:
+            yield driver, device
+        finally:
+            driver.close()
+
+
+def _listen(driver: Driver, until: Callable[[Said], bool]) -> list[Said]:
+    """What the driver says until something is as wanted; gives up after many polls."""
+    heard: list[Said] = []
+    for _ in range(TRIES):
+        heard += driver.poll(POLL_S)
+        if any(until(said) for said in heard):
+            break
+    return heard
+
+
+def _is_measurement(said: Said) -> bool:
+    return not isinstance(said, Remark)
+
+
+def _measured(said: Sequence[Said]) -> list[Any]:
+    return [one for one in said if _is_measurement(one)]
+
+
+@_promise("describes_itself", "a list of drivers must not need their hardware", plays=False)
+def _describes_itself(made: Kind) -> None:
+    _require(isinstance(getattr(made, "summary", None), str), "it has no one-line summary")
+    for method in ("discover", "open", "poll", "close"):
+        _require(callable(getattr(made, method, None)), f"it has no method {method}")
+
+
+@_promise("discovers_quietly", "looking for devices on any machine must end well", plays=False)
+def _discovers_quietly(made: Kind) -> None:
+    found = made.discover()
+    _require(isinstance(found, list), f"discover answered {found!r}, not a list")
+    strangers = [one for one in found if not isinstance(one, Found)]
+    _require(not strangers, f"discover found {strangers}, which are no Found")
+
+
+@_promise("refuses_settings", "a misspelt setting must not be ignored", plays=False)
+def _refuses_settings(made: Kind) -> None:
+    try:
+        made(NAME, BootClock(), no_such_setting=1)
+    except (SettingError, TypeError):
+        return
+    raise ConformanceError("it took a setting named 'no_such_setting'")
+
+
+@_promise("has_a_spec", "the watchdog must know how long silence may last")
+def _has_a_spec(made: Kind) -> None:
+    with _playing(made) as (driver, _):
+        spec = driver.spec
+        _require(isinstance(spec, DriverSpec), f"its spec is {spec!r}")
+        _require(spec.kinds, "its spec names no kinds of measurement")
+        _require(spec.nominal_hz >= spec.least_hz >= 0.0, f"nominal {spec.nominal_hz} Hz, least {spec.least_hz} Hz")
+
+
+@_promise("opens_and_says_what", "a log must tell which device and which settings it came from")
+def _opens_and_says_what(made: Kind) -> None:
+    with _playing(made) as (driver, _):
+        info = driver.open()
+        _require(isinstance(info, DeviceInfo), f"open answered {info!r}, not a DeviceInfo")
+        _require(info.model, "open tells no model")
+
+
+@_promise("measures", "what the device says must come out, under the sensor's name and of the kinds of its spec")
+def _measures(made: Kind) -> None:
+    with _playing(made) as (driver, device):
+        driver.open()
+        device.speak()
+        heard = _listen(driver, _is_measurement)
+        _require(_measured(heard), f"the device spoke and no measurement came in {TRIES} polls: {heard}")
+        for said in heard:
+            name = NAME if isinstance(said, Truth) else said.sensor
+            _require(name == NAME, f"{said} goes by the name {name!r}, not {NAME!r}")
+            _require(isinstance(said, (*driver.spec.kinds, Remark)), f"{said} is of no kind that its spec names")
+
+
+@_promise("stamps_honestly", "a stamp is when it was true: never in the future, never before the device was opened")
+def _stamps_honestly(made: Kind) -> None:
+    with _playing(made) as (driver, device):
+        opened_ns = device.clock.now_ns()
+        driver.open()
+        device.speak()
+        for said in _measured(_listen(driver, _is_measurement)):
+            now_ns = device.clock.now_ns()
+            early_s = seconds(opened_ns - said.time_ns)
+            _require(said.time_ns <= now_ns, f"{said} is stamped {seconds(said.time_ns - now_ns)} s in the future")
+            _require(early_s <= 0.0, f"{said} is stamped {early_s} s before the device was opened")
+
+
+@_promise("numbers_rise", "a gap in the numbers is how a lost message shows")
+def _numbers_rise(made: Kind) -> None:
+    with _playing(made) as (driver, device):
+        driver.open()
+        heard = []
+        for _ in range(3):
+            device.speak()
+            heard += _measured(_listen(driver, _is_measurement))
+        for kind in {type(said) for said in heard}:
+            numbers = [getattr(said, "seq", said.time_ns) for said in heard if type(said) is kind]
+            _require(numbers == sorted(set(numbers)), f"{kind.__name__} came with the numbers {numbers}")
+
+
+@_promise("waits_no_longer", "a poll that blocks keeps the robot from stopping")
+def _waits_no_longer(made: Kind) -> None:
+    with _playing(made) as (driver, device):
+        driver.open()
+        clocks = (device.clock, BootClock())
+        before = [clock.now_ns() for clock in clocks]
+        driver.poll(POLL_S)
+        took_s = max(seconds(clock.now_ns() - at) for clock, at in zip(clocks, before, strict=True))
+        _require(took_s <= POLL_S + LATE_S, f"a poll of {POLL_S} s took {took_s:.2f} s")
+
+
+@_promise("survives_garbage", "one bad line costs that line, and is told")
+def _survives_garbage(made: Kind) -> None:
+    with _playing(made) as (driver, device):
+        driver.open()
+        device.garble()
+        told = _listen(driver, lambda said: isinstance(said, Remark) and said.level is not Level.OK)
+        _require(any(isinstance(said, Remark) for said in told), "the device said nonsense and no remark tells of it")
+        device.speak()
+        _require(_measured(_listen(driver, _is_measurement)), "after nonsense no measurement came any more")
+
+
+@_promise("tells_of_loss", "a device that is gone must not look like one that is silent")
+def _tells_of_loss(made: Kind) -> None:
+    with _playing(made) as (driver, device):
+        driver.open()
+        device.speak()
+        _listen(driver, _is_measurement)
+        device.unplug()
+        try:
+            for _ in range(TRIES):
+                driver.poll(POLL_S)
+        except DeviceLostError as error:
+            _require(error.hint, "the error gives no hint")
+            return
+        raise ConformanceError(f"the device was unplugged and {TRIES} polls raised no DeviceLostError")
+
+
+@_promise("refuses_absence", "a missing device is an error with a remedy, and leaves nothing half open")
+def _refuses_absence(made: Kind) -> None:
+    with _playing(made) as (driver, device):
+        device.unplug()
+        try:
+            driver.open()
+        except DriverError as error:
+            _require(error.hint, "the error gives no hint")
+            _require(error.passes, f"{type(error).__name__} says that it cannot pass, but the device may be plugged in")
+            return
+        raise ConformanceError("it opened a device that is not there")
+
+
+@_promise("comes_back", "a cable is pulled and put back: the same driver must go on")
+def _comes_back(made: Kind) -> None:
+    with _playing(made) as (driver, device):
+        driver.open()
+        device.unplug()
+        driver.close()
+        device.plug()
+        driver.open()
+        device.speak()
+        _require(_measured(_listen(driver, _is_measurement)), "opened again after a loss, it measures nothing")
+
+
+@_promise("closes_always", "whatever state it is in, letting go must work")
+def _closes_always(made: Kind) -> None:
+    with _playing(made) as (driver, device):
+        driver.close()
+        driver.open()
+        driver.close()
+        driver.close()
+        driver.open()
+        device.unplug()
+        driver.close()

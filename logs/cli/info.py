@@ -1,0 +1,167 @@
+"""`fusion info`: what is in a log, whether anything is wrong with it, and which estimators could use it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fusion import FusionError, Measurement, Ranges, WifiScan
+from fusion.plugins import left_out
+from fusion.values import seconds
+from logs.cli.info_text import info_text
+from logs.devices import complaints, devices, dropped, wall_clock
+from logs.importers.bag import open_bag
+from logs.importers.roles import roles_of
+from logs.reader import holds_run, read_log
+from logs.run import Run
+from logs.timing import Stream
+from logs.usability import usability
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """Everything `fusion info` tells, as plain values: times in seconds, rates in hertz.
+
+    A bag of somebody else's is told topic by topic, under the key ``topics``.
+    """
+    if path.is_dir() or not holds_run(path):
+        return _describe_bag(path)
+    log = read_log(path)
+    run = log.run
+    return {
+        "path": str(path),
+        "name": run.name,
+        "world": run.world.name,
+        "world_hash": run.world.hash,
+        **_anchors(run),
+        "duration_s": _duration_s(run),
+        "channels": _channels(log.arrivals),
+        "truth": 0 if run.truth is None else len(run.truth),
+        "true_headings": 0 if run.truth is None else int(np.isfinite(run.truth.heading).sum()),
+        "prior": None if run.prior is None else [n if math.isfinite(n) else None for n in run.prior.pose],
+        "position_known": run.prior is not None and run.prior.position_known,
+        "heading_known": run.prior is not None and run.prior.heading_known,
+        "estimators": {name: len(estimates) for name, estimates in run.lanes.items()},
+        "usability": [verdict.record() for verdict in usability(run)],
+        "left_out": left_out(),
+        "wall_clock": wall_clock(run.clocks, _start_ns(log.arrivals)),
+        "devices": devices(run.remarks),
+        "complaints": dict(complaints(run.remarks)),
+        "dropped": dropped(run.remarks),
+        "metadata": dict(run.metadata),
+        "damage": log.damage.record() if log.damage is not None and str(log.damage) else None,
+        "warnings": list(run.warnings),
+    }
+
+
+def _describe_bag(path: Path) -> dict[str, Any]:
+    bag = open_bag(path, keep=lambda _kind, _sample: False)
+    heard = [topic for topic in bag.topics.values() if topic.count]
+    first_ns = min((topic.first_ns for topic in heard), default=0)
+    last_ns = max((topic.last_ns for topic in heard), default=0)
+    return {
+        "path": str(path),
+        "name": path.resolve().name.removesuffix(".mcap"),
+        "duration_s": seconds(last_ns - first_ns),
+        "topics": [
+            {
+                "topic": topic.name,
+                "type": topic.type,
+                "encoding": topic.encoding,
+                "count": topic.count,
+                "rate_hz": topic.rate_hz,
+                "undecodable": topic.unreadable,
+                "roles": roles_of(topic),
+                "names": sorted(topic.names),
+                "missing": topic.missing,
+            }
+            for topic in bag.topics.values()
+        ],
+        "warnings": bag.warnings,
+    }
+
+
+def _anchors(run: Run) -> dict[str, Any]:
+    """The anchors of the world, and the readings of each anchor that was heard, known or not."""
+    scans = (measurement for measurement in run.measurements if isinstance(measurement, WifiScan | Ranges))
+    heard = Counter(reading.anchor for scan in scans for reading in scan.readings)
+    known = [anchor.id for anchor in run.world.anchors]
+    return {
+        "anchors": known,
+        "readings": {anchor: heard[anchor] for anchor in known},
+        "unknown_anchors": {anchor: heard[anchor] for anchor in sorted(heard.keys() - set(known))},
+    }
+
+
+def _duration_s(run: Run) -> float:
+    times = [measurement.time_ns for measurement in run.measurements]
+    return seconds(max(times) - min(times)) if times else 0.0
+
+
+def _channels(arrivals: Sequence[tuple[int, Measurement]]) -> list[dict[str, Any]]:
+    """One row per sensor: how much, how often, and what is odd about its times."""
+    by_sensor: dict[tuple[str, str], list[tuple[int, int, int]]] = defaultdict(list)
+    for log_ns, measurement in arrivals:
+        row = (measurement.time_ns, log_ns, measurement.seq)
+        by_sensor[type(measurement).__name__, measurement.sensor].append(row)
+    start_ns = _start_ns(arrivals)
+    return [
+        {"kind": kind, "sensor": sensor, **Stream(*np.array(rows, dtype=np.int64).T).timing(start_ns)}
+        for (kind, sensor), rows in sorted(by_sensor.items())
+    ]
+
+
+def _start_ns(arrivals: Sequence[tuple[int, Measurement]]) -> int:
+    return min((measurement.time_ns for _, measurement in arrivals), default=0)
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Arguments of `fusion info`."""
+    runs = "a log, a folder of logs, or a bag of another robot"
+    parser.add_argument("runs", metavar="RUN", type=Path, nargs="+", help=runs)
+    parser.add_argument("--json", action="store_true", help="as JSON: an object, or a list of them for several files")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Tell what is in each log; one that cannot be read does not keep the others from being told."""
+    told = []
+    paths = [path for given in arguments.runs for path in _logs(given)]
+    for path in paths:
+        try:
+            told.append(describe(path))
+        except FusionError as error:
+            sys.stderr.write(f"fusion info: {error}\n")
+    several = paths != arguments.runs or len(paths) > 1
+    if not arguments.json:
+        sys.stdout.write("\n".join([*map(info_text, told), *_parts(arguments.runs, told)]))
+    elif told or several:
+        sys.stdout.write(json.dumps(told if several else told[0], indent=2) + "\n")
+    return int(len(told) < len(paths))
+
+
+def _logs(given: Path) -> list[Path]:
+    """The logs in a folder of ours; of a bag, which may be a folder of one recording, itself."""
+    inside = sorted(given.glob("*.mcap")) if given.is_dir() else []
+    return inside if any(map(_is_log, inside)) else [given]
+
+
+def _is_log(path: Path) -> bool:
+    try:
+        return holds_run(path)
+    except FusionError:
+        return False
+
+
+def _parts(given: Sequence[Path], told: Sequence[dict[str, Any]]) -> list[str]:
+    """What makes one log of them, where all are the parts of one recording."""
+    recordings = {about.get("metadata", {}).get("recording") for about in told}
+    if len(told) < 2 or len(recordings) > 1 or None in recordings:
+        return []
+    return [f"parts of one recording; one log of them: fusion join {' '.join(map(str, given))} -o RUN.mcap\n"]

@@ -1,0 +1,185 @@
+"""Which topic of a bag plays which role: as the user says, or found by its type where only one can be meant.
+
+Nothing is guessed: what could be two topics is refused with both named. The truth is never found by its type, because
+a goal or another filter's estimate looks just the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from fusion import World
+from fusion.errors import ParameterError, did_you_mean
+from fusion.world import DRIVES
+from logs.importers import foxglove
+from logs.importers.bag import TRANSFORM_TYPES, Bag, Topic
+from logs.importers.increments import wheel_joints
+from logs.importers.samples import IMU, JOINTS, ODOMETRY, POSE, POSE_WITH_COVARIANCE, RANGE, RANGES, WIFI
+
+ROLES: Mapping[str, tuple[str, ...]] = {
+    "odom": (ODOMETRY,),
+    "wheels": (JOINTS,),
+    "gyro": (IMU,),
+    "range": (RANGE, RANGES),
+    "wifi": (WIFI,),
+    "truth": (POSE, POSE_WITH_COVARIANCE, ODOMETRY, foxglove.POSE_IN_FRAME, *TRANSFORM_TYPES),
+}
+"""Roles, and the types that can play each."""
+ANCHOR = "range."
+"""What a role for the ranges of one anchor begins with; its name follows."""
+NOBODY = "none"
+"""Stands for a topic where a role is to stay empty."""
+FRAMES = "tf:"
+"""What the truth begins with where it is a transform: ``tf:map>base_link``."""
+AS_FRAMES = "write it as 'truth=tf:map>base_link', in quotes: a shell takes > for itself"
+
+
+@dataclass
+class Cast:
+    """Who plays what; a role that stays empty is missing."""
+
+    topics: dict[str, Topic] = field(default_factory=dict)
+    """The one topic of a role: odom, wheels, gyro, wifi, truth."""
+    joints: tuple[str, ...] = ()
+    """The joints that are wheels, in the wheel order of the world."""
+    ranges: list[tuple[str, str]] = field(default_factory=list)
+    """Topics of ranges, each with the anchor it is of; "" where its messages say."""
+    transforms: list[str] = field(default_factory=list)
+    """Topics of transforms that tell the truth, and ``frames``, which of them."""
+    frames: str = ""
+
+    @property
+    def used(self) -> list[str]:
+        """Names of all topics that play a role."""
+        return [*(topic.name for topic in self.topics.values()), *(name for name, _ in self.ranges), *self.transforms]
+
+    def __str__(self) -> str:
+        """The roles as they would be named."""
+        wheels = {"wheels": f":{','.join(self.joints)}"}
+        single = [f"{role}={topic.name}{wheels.get(role, '')}" for role, topic in self.topics.items()]
+        ranges = [f"{ANCHOR + anchor if anchor else 'range'}={name}" for name, anchor in self.ranges]
+        return " ".join([*single, *ranges, *([f"truth={FRAMES}{self.frames}"] if self.frames else [])])
+
+
+def roles_of(topic: Topic) -> list[str]:
+    """The roles that a topic could play, going by its type."""
+    return [role for role, kinds in ROLES.items() if topic.understood and topic.type in kinds]
+
+
+def truth_frames(topics: Mapping[str, str]) -> tuple[str, str] | None:
+    """Parent and child frame of a truth given as a transform, else None; raises `ParameterError`."""
+    asked = topics.get("truth", "")
+    if not asked.startswith(FRAMES):
+        return None
+    parent, _, child = (frame.strip("/ ") for frame in asked.removeprefix(FRAMES).partition(">"))
+    if not parent or not child:
+        raise ParameterError(f"truth: {asked!r} does not name two frames; {AS_FRAMES}")
+    return parent, child
+
+
+def assign(bag: Bag, world: World, topics: Mapping[str, str]) -> Cast:
+    """Give every role its topic; raises `ParameterError` for what the bag has not, or has more than once."""
+    cast = Cast()
+    for role, asked in topics.items():
+        _check_role(role, world)
+        if asked != NOBODY:
+            _give(cast, bag, role, asked)
+    if "odom" in cast.topics and "wheels" in cast.topics:
+        raise ParameterError(f"{bag.path}: odom and wheels are both named, and would count the motion twice; leave one")
+    for name in cast.used:
+        if cast.used.count(name) > 1:
+            raise ParameterError(f"{bag.path}: {name} is named for two roles; each needs a topic of its own")
+    free = [topic for topic in bag.topics.values() if topic.count and topic.understood and topic.name not in cast.used]
+    _find(cast, bag, world, topics, free)
+    if "wheels" in cast.topics:
+        cast.joints = wheel_joints(cast.topics["wheels"], cast.joints, world.robot)
+    return cast
+
+
+def _check_role(role: str, world: World) -> None:
+    anchor = role.removeprefix(ANCHOR)
+    if role.startswith(ANCHOR) and world.anchor(anchor) is None:
+        ids = [anchor.id for anchor in world.anchors]
+        raise ParameterError(f"{role}: the world has no anchor {anchor!r}; {did_you_mean(anchor, ids)}")
+    if not role.startswith(ANCHOR) and role not in ROLES:
+        raise ParameterError(f"there is no role {role!r}; {did_you_mean(role, [*ROLES, ANCHOR + 'ANCHOR'])}")
+
+
+def _give(cast: Cast, bag: Bag, role: str, asked: str) -> None:
+    """The role to the topic that was named for it."""
+    if role == "truth" and asked.startswith(FRAMES):
+        cast.frames = ">".join(truth_frames({role: asked}) or ())
+        cast.transforms = _transforms(bag, cast.frames)
+        return
+    name, _, joints = asked.partition(":") if role == "wheels" else (asked, "", "")
+    kinds = (RANGE,) if role.startswith(ANCHOR) else ROLES[role]
+    topic = _named(bag, role, name, kinds)
+    if role.startswith(ANCHOR) or role == "range":
+        cast.ranges.append((name, role.removeprefix(ANCHOR) if role.startswith(ANCHOR) else ""))
+    else:
+        cast.topics[role] = topic
+        cast.joints = tuple(joint.strip() for joint in joints.split(",")) if joints else cast.joints
+
+
+def _named(bag: Bag, role: str, name: str, kinds: tuple[str, ...]) -> Topic:
+    """The topic of that name, if it can play the role."""
+    if name not in bag.topics:
+        raise ParameterError(f"{bag.path}: {role}: there is no topic {name!r}; {did_you_mean(name, bag.topics)}")
+    topic = bag.topics[name]
+    if topic.type in TRANSFORM_TYPES and role == "truth":
+        pairs = ", ".join(sorted(topic.names))
+        raise ParameterError(f"{bag.path}: truth: {name} holds transforms ({pairs}); say which: {AS_FRAMES}")
+    if topic.type not in kinds:
+        raise ParameterError(f"{bag.path}: {role}: {name} is of the type {topic.type}, and not {' or '.join(kinds)}")
+    if not topic.understood:
+        raise ParameterError(f"{bag.path}: {role}: {name} is packed as {topic.encoding!r}, which is not read here")
+    if topic.missing:
+        raise ParameterError(f"{bag.path}: {role}: {name} cannot be read; {topic.missing}")
+    if not topic.count:
+        raise ParameterError(f"{bag.path}: {role}: {name} holds no message; leave the role out with {role}={NOBODY}")
+    return topic
+
+
+def _transforms(bag: Bag, pair: str) -> list[str]:
+    """Every topic that tells the transform ``parent>child``."""
+    all_transforms = [topic for topic in bag.topics.values() if topic.type in TRANSFORM_TYPES]
+    found = [topic.name for topic in all_transforms if pair in topic.names]
+    if not found:
+        pairs = {name for topic in all_transforms for name in topic.names}
+        hint = next((topic.missing for topic in all_transforms if topic.missing), "") or did_you_mean(pair, pairs)
+        raise ParameterError(f"{bag.path}: truth: no message transforms {pair} (transforms are not chained); {hint}")
+    return found
+
+
+def _find(cast: Cast, bag: Bag, world: World, topics: Mapping[str, str], free: Sequence[Topic]) -> None:
+    """Fill the roles that nobody was named for, but for the truth. The motion is told once: by the odometry first."""
+    for role in ("odom", "wheels", "gyro", "wifi"):
+        moves = role in ("odom", "wheels") and ("odom" in cast.topics or "wheels" in cast.topics)
+        has_wheels = DRIVES[world.robot.drive] > 0
+        if role in topics or moves or (role == "wheels" and not has_wheels):
+            continue
+        candidates = [topic for topic in free if topic.type in ROLES[role]]
+        if len(candidates) > 1:
+            raise _ambiguous(bag, role, [topic.name for topic in candidates])
+        if candidates:
+            cast.topics[role] = candidates[0]
+    if "range" not in topics:
+        named = {role.removeprefix(ANCHOR) for role in topics}
+        cast.ranges += _anchored(bag, {anchor.id for anchor in world.anchors} - named, free)
+
+
+def _anchored(bag: Bag, anchors: set[str], free: Sequence[Topic]) -> list[tuple[str, str]]:
+    """Topics whose ranges are of these anchors only: a sonar's are not."""
+    found = [topic for topic in free if topic.type in ROLES["range"] and topic.names and topic.names <= anchors]
+    for anchor in sorted(anchors):
+        rivals = [topic.name for topic in found if anchor in topic.names]
+        if len(rivals) > 1:
+            raise _ambiguous(bag, ANCHOR + anchor, rivals)
+    return [(topic.name, "") for topic in found]
+
+
+def _ambiguous(bag: Bag, role: str, names: Sequence[str]) -> ParameterError:
+    return ParameterError(
+        f"{bag.path}: {role} could be {' or '.join(names)}; say which with {role}={names[0]}, or {role}={NOBODY}"
+    )

@@ -1,0 +1,107 @@
+"""``fusion calibrate gyro``: bias, drift, scale and noise of a gyro."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from fusion.output.tables import Sheet
+from fusion.world import Robot
+from logs.run import Run
+from sensors.calibration.gyro import GyroCalibration, calibrate_gyro
+from sensors.calibration.gyro_picture import draw
+from sensors.calibration.held_out import Interval, sheet
+from sensors.cli.calibration import Findings, calibrate, configure_common
+
+METHOD = (
+    "mean of standstills told by the wheels, scale by least squares through the origin, overlapping Allan deviation"
+)
+DEGREES = math.degrees(1.0)
+
+
+def findings(runs: Sequence[Run], turns: float | None = None) -> Findings:
+    """The calibration as tables, sentences and changes of a world."""
+    found = calibrate_gyro(runs, turns)
+    robot = runs[0].world.robot
+    sheets = [_sheet(found, robot)]
+    if found.scores:
+        sheets.append(sheet("Gyro where it was not calibrated", found.scores))
+    return Findings(
+        name="gyro",
+        method=METHOD,
+        samples=len(found.standstills),
+        residual_std=float(np.std([stop.bias for stop in found.standstills])),
+        sheets=sheets,
+        remarks=_remarks(found, robot),
+        result=found._asdict(),
+        draw=partial(draw, found),
+        changes={"robot": _changes(found, robot)},
+        anchors={},
+    )
+
+
+def _changes(found: GyroCalibration, robot: Robot) -> dict[str, object]:
+    """The noise too, but only where the gyro gives the turn: else these keys speak of the wheels."""
+    changes: dict[str, object] = {"gyro_bias_rad_s": found.bias.value}
+    if found.scale is not None:
+        changes["gyro_scale"] = found.scale.value
+    noise = {}
+    if found.allan is not None:
+        noise["turn_std_per_sqrt_s"] = found.allan.noise.value
+    if found.drift_rad_s is not None:
+        noise["turn_bias_std_rad_s"] = math.hypot(found.drift_rad_s, found.bias.std)
+    return changes | ({"noise": noise} if robot.turn_source == "gyro" and noise else {})
+
+
+def _sheet(found: GyroCalibration, robot: Robot) -> Sheet:
+    rows = [("bias, °/s", f"{DEGREES * robot.gyro_bias_rad_s:.4f}", _degrees(found.bias).text(4))]
+    if found.drift_rad_s is not None:
+        rows.append(("its drift between standstills, °/s", "", f"{DEGREES * found.drift_rad_s:.4f}"))
+    if found.trend is not None:
+        rows.append(("its change, °/s an hour", "", _degrees(found.trend).text(2)))
+    if found.scale is not None:
+        rows.append(("scale, true over measured", f"{robot.gyro_scale:.4f}", found.scale.text(4)))
+    if found.allan is not None:
+        noise, lowest = _degrees(found.allan.noise), DEGREES * found.allan.bias_instability
+        rows.append(("noise density, °/√s", f"{DEGREES * robot.noise.turn_std_per_sqrt_s:.4f}", noise.text(4)))
+        rows.append(("bias instability, °/s", "", f"{'' if found.allan.is_lowest else 'below '}{lowest:.4f}"))
+    title = f"Gyro, from {len(found.standstills)} standstills and {len(found.turns)} turns"
+    return Sheet(title, ("", "world", "found, 95 %"), tuple(rows))
+
+
+def _degrees(interval: Interval) -> Interval:
+    return Interval(*(DEGREES * each for each in interval))
+
+
+def _remarks(found: GyroCalibration, robot: Robot) -> list[str]:
+    told = ["the log has no temperature: the bias holds for the warmth of this run"]
+    if len(found.standstills) == 1:
+        told.append("a single standstill: nothing says how the bias drifts; stop again, and at the end")
+    if found.scale is None:
+        told.append(
+            "fewer than three turns with a true heading: no scale; turn ten times by a mark and give --turns 10"
+        )
+    if found.allan is None or not found.allan.is_lowest:
+        told.append("the longest standstill is too short to see the bias wander; for its instability stand an hour")
+    if robot.turn_source != "gyro":
+        told.append(
+            f"the world takes the turn from its {robot.turn_source}: these numbers wait until turn_source = gyro"
+        )
+    return told
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """The options of ``fusion calibrate gyro``."""
+    configure_common(parser)
+    parser.add_argument(
+        "--turns", type=float, metavar="N", help="whole turns from the first standstill to the last, left positive"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Calibrate and tell."""
+    return calibrate(arguments, partial(findings, turns=arguments.turns))
