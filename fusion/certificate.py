@@ -1,7 +1,7 @@
 """The replay certificate: one hash over a run of an estimator, so that two replays can be compared.
 
-It covers the motion of every epoch, what became of every reading, and the estimate at every epoch. What happens between
-two epochs follows from these, so an estimate there need not be computed to be certified.
+It covers the motion of every epoch, what became of every reading, the estimate at every epoch and the newest one. What
+happens between two epochs follows from these, so an estimate there need not be computed to be certified.
 """
 
 from __future__ import annotations
@@ -26,15 +26,17 @@ class Certificate:
         import hashlib
 
         self._total = hashlib.sha256()
+        self._newest: Update | None = None
 
     def add(self, update: Update) -> None:
         """Take in one more update. Reads every number of it, so one that is no number raises here."""
+        self._newest = update
         for epoch in update.epochs:
             self._add_motion(epoch.motion)
         for fate in update.fates:
             self._add_fate(fate)
         if update.epochs:
-            self._add_estimate(update.estimate)
+            self._total.update(_estimate(update.estimate))
 
     def _add_motion(self, motion: Increment) -> None:
         x, y, heading, covariance, *rest = motion
@@ -45,16 +47,18 @@ class Certificate:
         self._total.update(text.encode())
         self._total.update(_numbers(fate.weight, fate.innovation, fate.innovation_variance, fate.nis))
 
-    def _add_estimate(self, estimate: Estimate) -> None:
-        self._total.update(
-            struct.pack("<q??q", estimate.time_ns, estimate.valid, estimate.heading_known, estimate.reset_count)
-        )
-        self._total.update(_numbers(*estimate.pose, *(estimate.covariance or (None,)), estimate.p_lost))
-
     @property
     def digest(self) -> str:
-        """SHA-256 as hexadecimal text."""
-        return self._total.hexdigest()
+        """SHA-256 as hexadecimal text; the newest estimate is in it, for what follows the last epoch counts too."""
+        total = self._total.copy()
+        if self._newest is not None:
+            total.update(_estimate(self._newest.estimate))
+        return total.hexdigest()
+
+
+def _estimate(estimate: Estimate) -> bytes:
+    flags = struct.pack("<q??q", estimate.time_ns, estimate.valid, estimate.heading_known, estimate.reset_count)
+    return flags + _numbers(*estimate.pose, *(estimate.covariance or (None,)), estimate.p_lost)
 
 
 def digest(updates: Iterable[Update]) -> str:

@@ -14,6 +14,7 @@ from operator import attrgetter
 from typing import NamedTuple
 
 from fusion.epochs import LONGEST, Epoch, FrontEnd, FrontEndState, Longest
+from fusion.errors import MeasurementError
 from fusion.fates import refused, unusable
 from fusion.motion import Increment
 from fusion.values import Decision, Fate, Measurement, Odometry, Ranges, Reason, WifiScan, nanoseconds
@@ -128,7 +129,12 @@ class Timeline:
 
     def _insert(self, key: Key, measurement: Measurement) -> tuple[Moment, ...]:
         """Put a late measurement in its place, and make what follows it anew."""
+        before = self._recent.copy(), self._base_key, self._base, self._settled
         place = bisect.bisect_left(self._recent, key, key=attrgetter("key"))
         later = [self._recent.pop() for _ in range(len(self._recent) - place)]
-        own = self._append(key, measurement)
-        return (own, *(self._append(entry.key, entry.measurement, revised=True) for entry in reversed(later)))
+        try:
+            own = self._append(key, measurement)
+            return (own, *(self._append(entry.key, entry.measurement, revised=True) for entry in reversed(later)))
+        except MeasurementError:
+            self._recent, self._base_key, self._base, self._settled = before
+            raise

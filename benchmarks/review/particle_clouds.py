@@ -41,7 +41,8 @@ class CloudWatch:
 
     def __call__(self, fold: Fold, moment: Moment) -> None:
         """Look, after ``moment`` was folded."""
-        if not isinstance(moment.measurement, WifiScan | Ranges) or (shown := fold.particles()) is None:
+        scans = [epoch for epoch in moment.epochs if epoch.scan is not None]
+        if not scans or (shown := fold.particles()) is None:
             return
         self._effective_number[moment.time_ns] = shown.effective_number
         if self._seen % self._every == 0:

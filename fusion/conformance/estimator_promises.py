@@ -423,11 +423,11 @@ def _rate_means_nothing(made: Kind) -> None:
 def _closing_changes_little(made: Kind) -> None:
     ends = []
     for longest in (LONGEST, SHORT):
-        *_, (estimator, state, epoch) = _states(made, NOISY, longest)
+        for estimator, state, epoch in _states(made, NOISY, longest):
+            if epoch.scan is None:
+                _, fates = estimator.step(state, epoch.motion, None)
+                _require(not fates, f"a stretch without radio was closed, and its step reports {len(fates)} fates")
         ends.append(estimator.estimate(state, epoch.motion, epoch.time_ns))
-        if epoch.scan is None:
-            _, fates = estimator.step(state, epoch.motion, None)
-            _require(not fates, f"a stretch without radio was closed, and its step reports {len(fates)} fates")
     off = _apart(ends[0].pose, ends[1].pose)
     chance = Tag.STOCHASTIC in made.tags
     _require(off < (NEAR_RAD if chance else NEAR_CLOSED), f"stretches closed early move the pose by {off:.3g}")

@@ -1,9 +1,11 @@
 """Streams of measurements, a world that counts, and an estimator that keeps a ledger of what the host gives it."""
 
+import math
 from collections import Counter
 from dataclasses import fields
 from functools import reduce
 
+from fusion.tracker import Tracker
 from hypothesis import strategies as st
 
 from fusion import (
@@ -14,6 +16,7 @@ from fusion import (
     Gyro,
     Increment,
     Odometry,
+    OdometryNoise,
     Pose,
     Prior,
     RangeReading,
@@ -24,10 +27,12 @@ from fusion import (
     World,
     final,
 )
+from fusion.epochs import LONGEST
 from fusion.timeline import Timeline, order
 
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000
+NOISE = OdometryNoise()
 ANCHORS = [
     {"id": "a", "position_m": [0, 0, 2]},
     {"id": "b", "position_m": [8, 0, 2]},
@@ -44,6 +49,21 @@ def odometry(k, distance_m=0.05, turn_rad=0.02, period_ns=SECOND // 10):
 
 def ranges(time_ns, seq=0, anchors="abc"):
     return Ranges(time_ns, "uwb", seq, tuple(RangeReading(anchor, 3.0 + 0.1 * (seq % 7)) for anchor in anchors))
+
+
+SCANS_MS = (1050, 2000, 3333)
+STREAM = sorted(
+    [*(odometry(k) for k in range(1, 41)), *(ranges(ms * MILLISECOND, ms) for ms in SCANS_MS)],
+    key=order,
+)
+"""Four seconds of odometry at 10 Hz, and three scans."""
+LATE_SCAN = ranges(2 * SECOND, 2000)
+LATE = [m for m in STREAM if m != LATE_SCAN]
+LATE.insert(LATE.index(ranges(3333 * MILLISECOND, 3333)) + 1, LATE_SCAN)
+"""The same, the second scan after the third."""
+CLOSED_S = math.ceil(LONGEST.duration_s)
+LONG = [odometry(k, 0.1, 0.01, SECOND) for k in range(1, 2 * CLOSED_S + 5)]
+"""Two stretches that are closed, and the beginning of a third."""
 
 
 @st.composite
@@ -100,6 +120,24 @@ def epochs_of(moments):
 def joined(epochs):
     """All the motion of some epochs as one increment."""
     return reduce(Increment.then, (epoch.motion for epoch in epochs), Increment())
+
+
+def integrated(odometries, time_ns=0):
+    motion = Increment(time_ns=time_ns)
+    for step in odometries:
+        motion = motion.extend(step, NOISE)
+    return motion
+
+
+def numbers(motion):
+    """Everything in an increment, flat."""
+    x, y, heading, covariance, *rest = motion
+    return [x, y, heading, *covariance, *rest]
+
+
+def updates_of(estimator, measurements, world=WORLD, seed=0):
+    tracker = Tracker(estimator, world, PRIOR, seed=seed)
+    return [update for measurement in measurements for update in tracker.push(measurement)]
 
 
 def last_words(updates):

@@ -1,28 +1,23 @@
-"""Motion pre-integrated may be cut and joined anywhere; where the host cuts it depends on the data alone."""
+"""Where the host cuts the motion of a run depends on the data alone, and what it makes of each measurement."""
 
 import math
 from dataclasses import replace
 from itertools import pairwise
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fusion import (
-    Covariance,
     Decision,
     Gyro,
     Increment,
     MeasurementError,
     Odometry,
-    OdometryNoise,
-    Pose,
     RangeReading,
     Ranges,
     Reason,
     WheelTicks,
-    compose,
     move,
 )
 from fusion.epochs import LONGEST, FrontEnd, Longest
@@ -31,146 +26,20 @@ from tests.fusion.streams import (
     SECOND,
     WORLD,
     epochs_of,
+    integrated,
     joined,
     late_streams,
     moments_of,
+    numbers,
     odometry,
     ranges,
-    steps,
     streams,
 )
 
-NOISE = OdometryNoise()
 GYRO_WORLD = replace(WORLD, robot=replace(WORLD.robot, turn_source="gyro"))
 SHORT = Longest(path_m=0.6, turn_rad=2.5, duration_s=0.7)
 RULE = Longest(path_m=20.0, turn_rad=6.25, duration_s=30.0)
 NEVER = Longest(math.inf, math.inf, math.inf)
-
-
-def integrated(odometries, time_ns=0):
-    motion = Increment(time_ns=time_ns)
-    for step in odometries:
-        motion = motion.extend(step, NOISE)
-    return motion
-
-
-def numbers(motion):
-    """Everything in an increment, flat."""
-    x, y, heading, covariance, *rest = motion
-    return [x, y, heading, *covariance, *rest]
-
-
-def close(motion):
-    return pytest.approx(numbers(motion), rel=1e-9, abs=1e-10)
-
-
-# --- an increment and its derivatives --------------------------------------------------------------------------------
-
-
-@given(steps(), st.integers(0, 25))
-def test_motion_cut_anywhere_and_joined_is_the_whole(odometries, cut):
-    first, second = odometries[:cut], odometries[cut:]
-    before = integrated(first)
-    joined_again = before.then(integrated(second, before.time_ns))
-    assert numbers(joined_again) == close(integrated(odometries))
-
-
-@given(steps())
-def test_motion_cut_everywhere_and_joined_is_the_whole(odometries):
-    motion = Increment()
-    for step in odometries:
-        motion = motion.then(integrated([step]))
-    assert numbers(motion) == close(integrated(odometries))
-
-
-@given(steps(max_size=8), steps(max_size=8), steps(max_size=8))
-def test_joining_is_associative(one, two, three):
-    a, b, c = map(integrated, (one, two, three))
-    assert numbers(a.then(b).then(c)) == close(a.then(b.then(c)))
-
-
-@given(steps())
-def test_no_motion_before_or_after_changes_nothing(odometries):
-    motion = integrated(odometries)
-    assert Increment().then(motion) == motion
-    assert motion.then(Increment(time_ns=motion.time_ns)) == motion
-
-
-@given(steps(max_size=8), steps(max_size=8))
-def test_pose_moved_by_joined_motion_is_the_pose_moved_twice(one, two):
-    a, b = integrated(one), integrated(two)
-    start = Pose(1.0, 2.0, 0.7), Covariance(0.1, 0.02, 0.01, 0.2, -0.01, 0.05)
-    once, twice = compose(*start, a.then(b)), compose(*compose(*start, a), b)
-    assert once[0][:2] == pytest.approx(twice[0][:2], abs=1e-10)
-    assert math.remainder(once[0].heading - twice[0].heading, math.tau) == pytest.approx(0.0, abs=1e-10)
-    assert once[1] == pytest.approx(twice[1], rel=1e-9, abs=1e-10)
-
-
-ERRORS = st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-0.02, 0.02))
-
-
-@given(steps(max_size=10), st.floats(-3.0, 3.0), ERRORS)
-def test_derivatives_of_a_move_are_those_of_finite_differences(odometries, heading, errors):
-    """By the distance error, the turn error and the turn bias, and by the heading, of which no turn depends."""
-    motion, step = integrated(odometries), 1e-6
-    moved = move(heading, motion, *errors)
-    rows = (
-        (-moved.dy, *moved.x_by_errors),
-        (moved.dx, *moved.y_by_errors),
-        (0.0, *moved.turn_by_errors),
-    )
-    analytic = np.array(rows)
-    numeric = np.empty((3, 4))
-    for column in range(4):
-        ahead, behind = (np.array([heading, *errors]) + sign * step * np.eye(4)[column] for sign in (1.0, -1.0))
-        numeric[:, column] = np.subtract(
-            move(*ahead[:1], motion, *ahead[1:])[:3], move(*behind[:1], motion, *behind[1:])[:3]
-        )
-    assert np.allclose(analytic, numeric / (2.0 * step), rtol=1e-6, atol=1e-6)
-
-
-@given(steps(max_size=10), st.floats(-3.0, 3.0), ERRORS)
-def test_noise_of_a_move_is_that_of_the_motion_turned_into_the_map(odometries, heading, errors):
-    motion = integrated(odometries)
-    c, s = math.cos(heading), math.sin(heading)
-    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    expected = rotation @ np.array(motion.covariance.matrix) @ rotation.T
-    assert np.allclose(move(heading, motion, *errors).noise.matrix, expected, rtol=1e-9, atol=1e-12)
-
-
-@given(steps(max_size=10), st.floats(-3.0, 3.0))
-def test_move_without_errors_is_the_pose_composed(odometries, heading):
-    motion = integrated(odometries)
-    moved, (pose, noise) = move(heading, motion), compose(Pose(0.0, 0.0, heading), Covariance(*[0.0] * 6), motion)
-    assert (moved.dx, moved.dy) == pytest.approx(pose[:2], abs=1e-12)
-    assert math.remainder(heading + moved.turn - pose.heading, math.tau) == pytest.approx(0.0, abs=1e-12)
-    assert moved.noise == pytest.approx(noise, abs=1e-12)
-
-
-@given(steps(max_size=10), ERRORS, st.floats(0.0, 1.0))
-def test_move_with_errors_is_the_motion_measured_without_them_to_first_order(odometries, errors, share):
-    """The increments as true wheels would give them, integrated: what is left out is of second order in the turn."""
-    distance_error, turn_error, turn_bias = (share * error for error in errors)
-    corrected = [
-        replace(
-            o,
-            distance_m=o.distance_m * (1.0 + distance_error),
-            turn_rad=o.turn_rad * (1.0 + turn_error) + turn_bias * (o.time_ns - o.from_ns) / SECOND,
-        )
-        for o in odometries
-    ]
-    motion, truth = integrated(odometries), integrated(corrected)
-    moved = move(0.0, motion, distance_error, turn_error, turn_bias)
-    turned = sum(abs(o.turn_rad) for o in odometries) * abs(turn_error) + motion.duration_s * abs(turn_bias)
-    assert moved.turn == pytest.approx(truth.heading, abs=1e-9)
-    assert math.hypot(moved.dx - truth.x, moved.dy - truth.y) <= 0.6 * turned**2 * truth.path_m + 1e-9
-
-
-def test_errors_of_many_robots_correct_a_motion_as_those_of_each():
-    motion = integrated([odometry(k, 0.3, 0.1) for k in range(1, 30)])
-    errors = np.random.default_rng(1).normal(0.0, 0.02, (3, 5))
-    together = np.array(motion.corrected(*errors))
-    assert np.array_equal(together.T, [motion.corrected(*one) for one in errors.T])
 
 
 # --- where a stretch is closed ---------------------------------------------------------------------------------------
@@ -268,7 +137,7 @@ def test_closing_loses_and_adds_no_motion(stream):
             stretch = []
     assert [scan for _, scan in early] == [epoch.scan for epoch in never]
     for (motion, _), epoch in zip(early, never, strict=True):
-        assert numbers(motion) == close(epoch.motion)
+        assert numbers(motion) == pytest.approx(numbers(epoch.motion), rel=1e-9, abs=1e-10)
 
 
 @given(streams())

@@ -1,37 +1,31 @@
-"""Several estimators on one timeline, estimates when asked for, failures by name, and what the certificate covers."""
+"""Several estimators on one timeline, estimates when asked for and failures by name."""
 
 import gc
 import math
 import weakref
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
 
 from fusion import (
-    Decision,
     Estimate,
-    Fate,
-    Increment,
-    Odometry,
     ParameterError,
     PluginError,
-    Pose,
-    Reason,
     Update,
     build,
     digest,
-    final,
 )
-from fusion.certificate import Certificate
-from fusion.epochs import LONGEST
 from fusion.fold import Fold
 from fusion.timeline import Timeline, order
 from fusion.tracker import Tracker
 from tests.fusion.streams import (
-    MILLISECOND,
+    CLOSED_S,
+    LATE,
+    LONG,
     PRIOR,
+    SCANS_MS,
     SECOND,
+    STREAM,
     WORLD,
     CountingWorld,
     Ledger,
@@ -39,17 +33,8 @@ from tests.fusion.streams import (
     late_streams,
     odometry,
     ranges,
+    updates_of,
 )
-
-SCANS_MS = (1050, 2000, 3333)
-STREAM = sorted(
-    [*(odometry(k) for k in range(1, 41)), *(ranges(ms * MILLISECOND, ms) for ms in SCANS_MS)],
-    key=order,
-)
-"""Four seconds of odometry at 10 Hz, and three scans."""
-CLOSED_S = math.ceil(LONGEST.duration_s)
-LONG = [odometry(k, 0.1, 0.01, SECOND) for k in range(1, 2 * CLOSED_S + 5)]
-"""Two stretches that are closed, and the beginning of a third."""
 
 
 def folded(timeline, folds, measurements):
@@ -60,11 +45,6 @@ def folded(timeline, folds, measurements):
             for fold, mine in zip(folds, updates, strict=True):
                 mine.append(fold.take(moment))
     return updates
-
-
-def updates_of(estimator, measurements=STREAM, world=WORLD, seed=0):
-    tracker = Tracker(estimator, world, PRIOR, seed=seed)
-    return [update for measurement in measurements for update in tracker.push(measurement)]
 
 
 # --- one timeline, several folds -------------------------------------------------------------------------------------
@@ -91,16 +71,14 @@ def test_fold_beside_others_is_the_fold_alone():
     names = ("ekf", "particle", "bayes_weight")
     together = folded(Timeline(WORLD, 0), [Fold(build(name, WORLD), PRIOR, 3) for name in names], STREAM)
     for name, updates in zip(names, together, strict=True):
-        assert digest(updates) == digest(updates_of(build(name, WORLD), seed=3))
+        assert digest(updates) == digest(updates_of(build(name, WORLD), STREAM, seed=3))
 
 
 def test_every_epoch_is_stepped_once_and_again_only_where_late_data_revise_it():
     estimator = Ledger()
-    updates_of(estimator)
+    updates_of(estimator, STREAM)
     assert estimator.stepped == len(SCANS_MS)
-    late = [m for m in STREAM if m != ranges(2 * SECOND, 2000)]
-    late.insert(late.index(ranges(3333 * MILLISECOND, 3333)) + 1, ranges(2 * SECOND, 2000))
-    updates = updates_of(estimator := Ledger(), late)
+    updates = updates_of(estimator := Ledger(), LATE)
     assert estimator.stepped == len(SCANS_MS) + 1
     assert [update.measurement for update in updates if update.revised] == [
         m for m in STREAM if 2.0 < m.time_ns / SECOND < 3.34
@@ -137,7 +115,7 @@ def test_states_that_late_data_can_no_longer_ask_for_are_let_go():
 
 def test_estimate_of_an_update_is_computed_once_and_only_when_asked_for():
     estimator = Ledger()
-    updates = updates_of(estimator)
+    updates = updates_of(estimator, STREAM)
     assert estimator.asked == 0
     once = updates[5].estimate
     assert updates[5].estimate is once
@@ -153,12 +131,10 @@ def test_update_made_of_an_estimate_has_that_estimate():
 
 def test_estimate_asked_for_late_is_that_of_its_own_moment():
     """After the run, backwards, and though late data revised what followed."""
-    late = [m for m in STREAM if m != ranges(2 * SECOND, 2000)]
-    late.insert(late.index(ranges(3333 * MILLISECOND, 3333)) + 1, ranges(2 * SECOND, 2000))
     at_once, tracker = [], Tracker(Ledger(), WORLD, PRIOR)
-    for measurement in late:
+    for measurement in LATE:
         at_once += [(update.measurement, update.estimate) for update in tracker.push(measurement)]
-    afterwards = [(update.measurement, update.estimate) for update in reversed(updates_of(Ledger(), late))]
+    afterwards = [(update.measurement, update.estimate) for update in reversed(updates_of(Ledger(), LATE))]
     assert repr(afterwards[::-1]) == repr(at_once)
 
 
@@ -204,7 +180,7 @@ class FailsToEstimate(Ledger):
 
 def test_estimator_that_fails_on_a_scan_is_named_with_its_time_and_sensor():
     with pytest.raises(PluginError, match=r"FailsToStep failed on Ranges of 'uwb' at 2000000000 ns: .*no such weight"):
-        updates_of(FailsToStep())
+        updates_of(FailsToStep(), STREAM)
 
 
 def test_estimator_that_fails_on_motion_alone_is_named_with_its_time():
@@ -215,7 +191,7 @@ def test_estimator_that_fails_on_motion_alone_is_named_with_its_time():
 
 
 def test_estimator_that_fails_when_asked_is_named_with_the_time_and_only_then():
-    updates = updates_of(FailsToEstimate())
+    updates = updates_of(FailsToEstimate(), STREAM)
     early, late = (next(u for u in updates if u.measurement.time_ns == s * SECOND) for s in (1, 2))
     assert early.estimate.valid
     for _ in range(2):
@@ -227,7 +203,7 @@ def test_estimator_that_fails_when_asked_is_named_with_the_time_and_only_then():
 
 def test_failure_says_what_to_do():
     with pytest.raises(PluginError, match=r"--estimators.*author"):
-        updates_of(FailsToStep())
+        updates_of(FailsToStep(), STREAM)
 
 
 def test_error_of_our_own_passes_as_it_is():
@@ -239,157 +215,6 @@ def test_error_of_our_own_passes_as_it_is():
             raise ParameterError("give another time")
 
     with pytest.raises(ParameterError, match="give another number"):
-        updates_of(Refuses())
+        updates_of(Refuses(), STREAM)
     with pytest.raises(ParameterError, match="give another time"):
         Tracker(Refuses(), WORLD, PRIOR).estimate(0)
-
-
-# --- the certificate -------------------------------------------------------------------------------------------------
-
-
-class Constant(Ledger):
-    """Its fates and estimates depend on nothing but the number of epochs."""
-
-    def estimate(self, state, motion, time_ns):
-        return Estimate(time_ns, Pose(float(len(state)), 0.0, 0.0), None)
-
-
-def changed(stream, index, **values):
-    return [replace(m, **values) if i == index else m for i, m in enumerate(stream)]
-
-
-def by_an_ulp(number):
-    return math.nextafter(number, math.inf)
-
-
-@pytest.mark.parametrize("name", ["distance_m", "turn_rad"])
-@pytest.mark.parametrize("estimator", [Constant, Ledger])
-def test_certificate_tells_motions_apart_that_differ_in_the_last_bit(estimator, name):
-    """An epoch of one increment, for a sum may swallow a bit; to `Constant` nothing else differs."""
-    stream = [odometry(1), ranges(SECOND // 10), *STREAM[1:]]
-    moved = changed(stream, 0, **{name: by_an_ulp(getattr(stream[0], name))})
-    assert digest(updates_of(estimator(), moved)) != digest(updates_of(estimator(), stream))
-
-
-@pytest.mark.parametrize("place", ["covariance", *Increment._fields])
-def test_certificate_covers_every_number_of_the_motion(place):
-    (epoch,) = updates_of(Constant(), LONG)[CLOSED_S - 1].epochs
-    value = getattr(epoch.motion, place)
-    if place == "covariance":
-        others = [value._replace(**{axis: by_an_ulp(getattr(value, axis))}) for axis in value._fields]
-    else:
-        others = [value + 1 if isinstance(value, int) else by_an_ulp(value)]
-    estimate = Estimate(0, PRIOR.pose, None)
-    for other in others:
-        moved = epoch._replace(motion=epoch.motion._replace(**{place: other}))
-        one, another = (digest([Update(LONG[CLOSED_S - 1], estimate, (), epochs=(e,))]) for e in (epoch, moved))
-        assert one != another
-
-
-def test_certificate_covers_fates_of_the_screening_and_of_the_estimator():
-    """A reading of an anchor that the world does not have changes no estimate."""
-    with_unknown = changed(STREAM, STREAM.index(ranges(2 * SECOND, 2000)))
-    unknown = replace(ranges(2 * SECOND, 2000), readings=ranges(0, 0, "abcz").readings)
-    with_unknown[with_unknown.index(ranges(2 * SECOND, 2000))] = unknown
-
-    class Downweights(Constant):
-        def step(self, state, motion, scan):
-            after, fates = super().step(state, motion, scan)
-            return after, tuple(fate._replace(weight=by_an_ulp(0.5)) for fate in fates)
-
-    class DownweightsLess(Constant):
-        def step(self, state, motion, scan):
-            after, fates = super().step(state, motion, scan)
-            return after, tuple(fate._replace(weight=0.5) for fate in fates)
-
-    digests = {
-        digest(updates_of(estimator(), stream))
-        for estimator, stream in (
-            (Constant, STREAM),
-            (Constant, with_unknown),
-            (Downweights, STREAM),
-            (DownweightsLess, STREAM),
-        )
-    }
-    assert len(digests) == 4
-
-
-FATE = Fate(0, "uwb", 0, "a", Decision.USED, Reason.OK, 1.0)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"time_ns": 1},
-        {"sensor": "uwb2"},
-        {"seq": 1},
-        {"anchor": "b"},
-        {"decision": Decision.REJECTED},
-        {"reason": Reason.GATE},
-        {"weight": math.nextafter(1.0, 0.0)},
-        {"innovation": 0.0},
-        {"innovation_variance": 0.0},
-        {"nis": 0.0},
-    ],
-    ids=lambda change: next(iter(change)),
-)
-def test_certificate_covers_every_field_of_a_fate(change):
-    estimate = Estimate(0, PRIOR.pose, None)
-    one, other = (digest([Update(ranges(0), estimate, (fate,))]) for fate in (FATE, FATE._replace(**change)))
-    assert one != other
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"time_ns": 1},
-        {"pose": Pose(by_an_ulp(2.0), 1.0, 0.3)},
-        {"pose": Pose(2.0, by_an_ulp(1.0), 0.3)},
-        {"pose": Pose(2.0, 1.0, by_an_ulp(0.3))},
-        {"covariance": None},
-        {"covariance": PRIOR.covariance._replace(xy=-0.0)},
-        {"covariance": PRIOR.covariance._replace(hh=by_an_ulp(PRIOR.covariance.hh))},
-        {"valid": False},
-        {"heading_known": False},
-        {"p_lost": 0.0},
-        {"reset_count": 1},
-    ],
-    ids=lambda change: next(iter(change)),
-)
-def test_certificate_covers_the_estimate_at_every_epoch(change):
-    estimate = Estimate(0, PRIOR.pose, PRIOR.covariance)
-    epochs = next(update.epochs for update in updates_of(Ledger()) if update.epochs)
-    one, other = (digest([Update(ranges(0), e, (), epochs=epochs)]) for e in (estimate, estimate._replace(**change)))
-    assert one != other
-
-
-def test_certificate_asks_for_an_estimate_at_epochs_alone():
-    estimator = Ledger()
-    digest(updates_of(estimator))
-    assert estimator.asked == len(SCANS_MS)
-
-
-def test_certificate_so_far_is_the_digest_of_the_updates_so_far():
-    certificate, updates = Certificate(), updates_of(Ledger())
-    for count, update in enumerate(updates, start=1):
-        certificate.add(update)
-        if count % 10 == 0:
-            assert certificate.digest == digest(updates[:count])
-
-
-def test_certificate_tells_an_order_of_arrival_apart_and_the_last_words_do_not():
-    late = [m for m in STREAM if m != ranges(2 * SECOND, 2000)]
-    late.insert(late.index(ranges(3333 * MILLISECOND, 3333)) + 1, ranges(2 * SECOND, 2000))
-    in_order, revised = updates_of(Ledger()), updates_of(Ledger(), late)
-    assert digest(in_order) != digest(revised)
-    assert digest(final(in_order)) == digest(final(revised))
-
-
-@pytest.mark.xfail(strict=True, reason="motion after the last epoch is not certified, nor is a run without any epoch")
-@pytest.mark.parametrize("stream", [STREAM, [odometry(k) for k in range(1, 41)]], ids=["tail", "no radio"])
-def test_certificate_covers_the_motion_after_the_last_epoch(stream):
-    far = changed(stream, len(stream) - 1, distance_m=3.0)
-    assert isinstance(stream[-1], Odometry)
-    one, other = updates_of(Ledger(), stream), updates_of(Ledger(), far)
-    assert one[-1].estimate != other[-1].estimate
-    assert digest(one) != digest(other)
