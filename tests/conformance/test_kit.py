@@ -384,7 +384,6 @@ def test_correct_estimator_keeps_every_promise(check):
     check.run()
 
 
-
 @pytest.mark.parametrize(
     ("broken", "promise_id"),
     [pytest.param(*pair, id=f"{pair[0].__name__}-{pair[1]}") for pair in BROKEN.items()],

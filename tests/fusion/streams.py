@@ -5,7 +5,6 @@ from collections import Counter
 from dataclasses import fields
 from functools import reduce
 
-from fusion.tracker import Tracker
 from hypothesis import strategies as st
 
 from fusion import (
@@ -29,6 +28,7 @@ from fusion import (
 )
 from fusion.epochs import LONGEST
 from fusion.timeline import Timeline, order
+from fusion.tracker import Tracker
 
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000

@@ -16,7 +16,7 @@ from fusion import (
     digest,
 )
 from fusion.fold import Fold
-from fusion.timeline import Timeline, order
+from fusion.timeline import Timeline
 from fusion.tracker import Tracker
 from tests.fusion.streams import (
     CLOSED_S,

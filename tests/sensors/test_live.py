@@ -30,7 +30,7 @@ from fusion.cli.main import main
 from logs.cli.join import join
 from logs.reader import read_run
 from sensors.cli.live import describe, record
-from sensors.onboard import split_log
+from sensors.onboard import rolling_log
 from sensors.onboard.driver_lifecycle import State
 from sensors.onboard.live import Now, live
 from tests.sensors.robot_files import robot_text
@@ -235,7 +235,7 @@ def test_with_nothing_left_to_say_it_ends(robot):
 
 def test_a_disk_that_fills_up_ends_the_recording_and_not_the_pose(robot, tmp_path, monkeypatch):
     full = threading.Event()
-    monkeypatch.setattr(split_log, "free_bytes", lambda _: 1e6 if full.is_set() else 1e12)
+    monkeypatch.setattr(rolling_log, "free_bytes", lambda _: 1e6 if full.is_set() else 1e12)
     monkeypatch.setattr("sensors.onboard.recording.DISK_S", 0.3)
     full_robot = robot(record="min_free_mb = 100.0")
     told = []

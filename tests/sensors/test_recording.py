@@ -19,7 +19,7 @@ from fusion.cli.main import main
 from fusion.values import Gyro, WheelTicks, WifiScan
 from logs.cli.join import join
 from logs.reader import read_run
-from sensors.onboard import split_log
+from sensors.onboard import rolling_log
 from sensors.onboard.recorder import record
 from tests.sensors.robot_files import robot_text
 
@@ -137,7 +137,7 @@ def test_failing_fast_ends_with_the_reason(robot, tmp_path):
 
 def test_a_disk_that_fills_up_ends_the_recording_cleanly(robot, tmp_path, monkeypatch):
     full = threading.Event()
-    monkeypatch.setattr(split_log, "free_bytes", lambda _: 1e6 if full.is_set() else 1e12)
+    monkeypatch.setattr(rolling_log, "free_bytes", lambda _: 1e6 if full.is_set() else 1e12)
     done = recorded(robot(record="min_free_mb = 100.0"), tmp_path / "out", 60.0, tell=lambda *_: full.set())
     assert "nearly full: 99 MB less" in done.trouble
     assert not read_run(done.paths[0]).warnings
@@ -153,7 +153,7 @@ def test_a_ring_gives_up_the_oldest_files_of_its_robot_only(robot, tmp_path, mon
     ):
         (folder / name).write_bytes(b"x")
         os.utime(folder / name, ns=(age, age))
-    monkeypatch.setattr(split_log, "free_bytes", lambda _: 1e9 if len(list(folder.iterdir())) <= 3 else 0)
+    monkeypatch.setattr(rolling_log, "free_bytes", lambda _: 1e9 if len(list(folder.iterdir())) <= 3 else 0)
     done = recorded(robot(record="min_free_mb = 100.0\nring = true"), folder, 0.5)
     assert done.trouble == ""
     assert not (folder / "trolley-aaaaaaaa-0000.mcap").exists()

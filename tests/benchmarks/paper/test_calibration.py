@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors as score
-from benchmarks.paper import calibrate, calibrated
+from benchmarks.paper import fit_environments
 from benchmarks.paper.assumptions import ALTERNATIVES, MAIN, filled
 from benchmarks.paper.environment_files import (
     ALTERNATIVES_FILE,
@@ -96,7 +96,7 @@ def test_solution_meets_its_target_and_comes_again():
 
 
 def test_what_cannot_be_solved_is_refused_with_a_remedy(monkeypatch):
-    monkeypatch.setitem(calibrate.BRACKETS, WIFI, (0.01, 0.02))
+    monkeypatch.setitem(fit_environments.BRACKETS, WIFI, (0.01, 0.02))
     with pytest.raises(FusionError, match=r"office, as calibrated: no value between .* change floor, route or anchors"):
         solve((Unknown(OFFICE, MAIN, WIFI), table(), range(SEEDS.start, SEEDS.start + 3)))
 
@@ -111,7 +111,7 @@ def test_nothing_is_solved_for_twice_and_never_on_the_proposed_method():
 def test_files_keep_their_comments_and_lead_back_to_the_same_scenarios(tmp_path, monkeypatch):
     numbers = {ODOMETRY: Solved(0.5, 0.24), WIFI: Solved(1.5, 0.82)}
     monkeypatch.setattr(
-        calibrated, "solve_all", lambda *_: ((unknown, numbers[unknown.lane]) for unknown in unknowns())
+        environment_files, "solve_all", lambda *_: ((unknown, numbers[unknown.lane]) for unknown in unknowns())
     )
     told = []
     written = write_calibrated(tmp_path, told=told.append)

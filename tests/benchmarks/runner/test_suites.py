@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.runner import definition
+from benchmarks.runner import suite as definition
 from benchmarks.runner.plan import contestant_spec, read_faults
 from benchmarks.runner.suite import builtin_suites, load_suite
 from fusion import SuiteError
