@@ -44,7 +44,7 @@ class Judged(NamedTuple):
 
     @property
     def is_decided(self) -> bool:
-        """Whether there are enough runs for its verdict to stay as it is, if the claim goes on holding as often."""
+        """True where more runs change nothing about its verdict, if the claim goes on holding as often."""
         return runs_to_decide([*self.shares.values()]) <= min(share.total for share in self.shares.values())
 
 
@@ -75,8 +75,8 @@ def verdict(shares: Sequence[Share]) -> str:
 
 
 def runs_to_decide(shares: Sequence[Share]) -> float:
-    """How many runs of each environment decide a claim that goes on holding as often: until all shares are nearly
-    always, or all nearly never, or it is certain that neither is so. Infinite where a share is just at a limit.
+    """Number of runs of each environment that decides a claim which goes on holding as often: until all shares are
+    nearly always, or all nearly never, or it is certain that neither is so. Infinite where a share is just at a limit.
     """
     values = [share.value for share in shares]
     by_always = [(value >= NEARLY_ALWAYS, runs_to_exclude(value, NEARLY_ALWAYS)) for value in values]
@@ -88,7 +88,7 @@ def runs_to_decide(shares: Sequence[Share]) -> float:
 
 
 def in_words(judged: Sequence[Judged]) -> str:
-    """How many claims hold nearly always, nearly never and in a part of the runs, and how many runs decide the rest."""
+    """The claims counted: nearly always, nearly never, in a part of the runs, undecided; and what would decide."""
     decided = [each.verdict for each in judged if each.is_decided]
     whole, missing = decided.count(REPRODUCED), decided.count(NOT_REPRODUCED)
     counts = (

@@ -37,7 +37,7 @@ class Spread(NamedTuple):
 
 
 def runs_to_exclude(share: float, limit: float) -> float:
-    """How many runs it takes until the interval of a `Share` that stays at ``share`` lies on one side of ``limit``.
+    """Number of runs after which the interval of a `Share` that stays at ``share`` lies on one side of ``limit``.
 
     A Wilson interval of n runs excludes q where n (p - q)^2 >= z^2 q (1 - q); infinite for p = q.
     """

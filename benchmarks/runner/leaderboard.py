@@ -58,7 +58,7 @@ def _is_scored(scores: Sequence[Score]) -> bool:
 
 
 def _truthless(run: str, scores: Sequence[Score]) -> Table:
-    """What a log without truth allows: whether readings came as far off as expected, availability and time."""
+    """A table for a log without truth: NIS of the readings beside an honest filter's band, availability and time."""
     columns: list[Column] = []
     for sensor in NAMES:
         if any(f"nis_{sensor}" in score.facts for score in scores):

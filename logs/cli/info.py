@@ -160,7 +160,7 @@ def _is_log(path: Path) -> bool:
 
 
 def _parts(given: Sequence[Path], told: Sequence[dict[str, Any]]) -> list[str]:
-    """What makes one log of them, where all are the parts of one recording."""
+    """The command that makes one log of them, where all are the parts of one recording."""
     recordings = {about.get("metadata", {}).get("recording") for about in told}
     if len(told) < 2 or len(recordings) > 1 or None in recordings:
         return []

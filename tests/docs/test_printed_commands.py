@@ -16,7 +16,7 @@ ADDED = {
     "fusion record": "--duration 1",
     "fusion live": "--duration 1",
 }
-"""What ends a command that would else go on until somebody ends it."""
+"""Words that end a command which would else go on until somebody ends it."""
 EXIT_CODES = {"fusion repair": {3}, "fusion doctor": {0, 1}}
 """Where it is not 0: a cut-off log has lost something; a computer may lack what a robot's has."""
 ELSEWHERE = {
@@ -26,7 +26,7 @@ ELSEWHERE = {
     "fusion bench report": "needs the cells of that; tests/benchmarks/test_report.py",
     "fusion reproduce": "eight minutes; tests/benchmarks/paper",
 }
-"""Why a command of the README is not run here."""
+"""Commands of the README that are not run here, with the reason."""
 
 
 def blocks(page, language):
@@ -73,13 +73,13 @@ def test_every_option_of_a_command_within_a_sentence_exists(page):
 
 
 def named(table, line):
-    """What a table holds of a command, by how it begins."""
+    """The entry of a table for a command, by its first words."""
     return next((value for start, value in table.items() if line.startswith(start)), None)
 
 
 @pytest.fixture
 def at_hand(tmp_path, monkeypatch):
-    """What the README takes for granted: a folder of CSV, a log that was cut off, a robot file."""
+    """Files that the README takes for granted: a folder of CSV, a log that was cut off, a robot file."""
     monkeypatch.chdir(tmp_path)
     assert main(["simulate", "office", "--duration", "20", "-o", "mine.mcap"]) == 0
     assert main(["export", "mine.mcap", "--csv", "-o", "my_recording"]) == 0

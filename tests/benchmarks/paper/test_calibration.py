@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors as score
-from benchmarks.paper import fit_environments
+from benchmarks.paper import environment_files, fit_environments
 from benchmarks.paper.assumptions import ALTERNATIVES, MAIN, filled
 from benchmarks.paper.environment_files import (
     ALTERNATIVES_FILE,
