@@ -90,7 +90,7 @@ def demo(
 def _draw(run: Run, folder: Path, seed: int) -> Drawn:
     """The review and its picture; the scores of the demo do not depend on them."""
     _tell("drawing the review")
-    lanes, scores = fold(run, {name: {} for name in fusion.names()}, seed)
+    lanes, scores = fold(run, {name: {} for name in fusion.available()}, seed)
     scene, picture = None, folder / "review.png"
     try:
         (scene,) = write_scene(folder / "review.rrd", run, lanes, scores)

@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
             workers=arguments.workers,
             progress=progress,
         )
-    for remark in (*left_out(), *report.remarks):
+    for remark in (*(left_out() if arguments.estimators is None else ()), *report.remarks):
         _tell(remark)
     print_sheets(list(report.sheets.values()))
     sys.stdout.write(f"{in_words(report.judged)}\n")
