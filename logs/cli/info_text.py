@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 from logs.timing import GAP_PERIODS
 
 Facts: TypeAlias = Mapping[str, Any]
-"""Plain values, as `logs.info.describe` answers them."""
+"""Plain values, as `logs.cli.info.describe` answers them."""
 
 
 def info_text(about: Facts) -> str:

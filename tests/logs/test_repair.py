@@ -352,7 +352,7 @@ def test_command_tells_what_was_kept_and_lost_in_words_and_as_json(tmp_path, cap
 
 
 def test_pipe_is_refused(tmp_path):
-    shell = f"cat {write_mcap(tmp_path / 'run.mcap')} | {sys.executable} -m fusion.cli info /dev/stdin"
+    shell = f"cat {write_mcap(tmp_path / 'run.mcap')} | {sys.executable} -m fusion.cli.main info /dev/stdin"
     done = subprocess.run(["sh", "-c", shell], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     assert "give a file" in done.stderr
@@ -395,7 +395,7 @@ def test_without_an_output_the_usage_is_wrong(tmp_path):
 
 FULL = """
 import resource, signal, sys
-from fusion.cli import main
+from fusion.cli.main import main
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (700, 700))
 sys.exit(main(["repair", sys.argv[1], "-o", sys.argv[2], "--force"]))
