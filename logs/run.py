@@ -29,8 +29,8 @@ class Run:
     """One recorded run. ``measurements`` stand in the order they arrived; ``lanes`` holds the estimates of estimators
     that were replayed into the log, by name; ``remarks`` are what the devices said that is no measurement, ``clocks``
     how the clocks of the recording computer stood to each other. ``true_stamps``: where a wrong clock stamped a
-    measurement, the time a right one would have stamped it with [ns], by `fusion.timeline.order`; empty but for runs that
-    were given that fault.
+    measurement, the time a right one would have stamped it with [ns], by `fusion.timeline.order`; empty but for runs
+    that were given that fault.
     """
 
     path: Path

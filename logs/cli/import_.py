@@ -29,8 +29,8 @@ def import_recordings(kind: str, folder: Path, output: Path, **options: Any) -> 
     """Write every run found in ``folder`` as a log; answers their paths.
 
     ``output`` ending in ``.mcap`` is one log, and the folder must hold one run; else a folder that gets one log a run.
-    The kind `rosbag` takes a file as well, and the ``options`` of `logs.importers.rosbag.recordings`. What is lost or doubtful is
-    told on stderr. Raises `RecordingError` for an unknown kind, a folder without such files, or a file that cannot be
+    The kind `rosbag` takes a file as well, and the ``options`` of `logs.importers.rosbag.recordings`. What is
+    lost or doubtful stands on stderr. Raises `RecordingError` for an unknown kind, a folder without such files, or a file that cannot be
     understood, `ParameterError` for options that the kind does not take.
     """
     if kind not in KINDS:
