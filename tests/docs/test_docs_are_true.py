@@ -2,6 +2,7 @@
 
 import importlib
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -77,3 +78,23 @@ def resolved(parts):
 def test_every_script_named_exists(page):
     for script in re.findall(r"\w[\w/]*/[a-z0-9_]+\.py\b", page.read_text(encoding="utf-8")):
         assert (ROOT / script).is_file(), script
+
+
+def extras():
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)["project"]["optional-dependencies"].keys() - {"test"}
+
+
+def test_readme_lists_every_extra_with_its_size():
+    (table,) = re.findall(
+        r"^\| extra \|.*\n((?:\|.*\n)+)", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert set(re.findall(r"^\| `?(\w+)`? \|.* \d+ \|$", table, re.MULTILINE)) == {*extras(), "none"}
+
+
+def test_every_remedy_names_an_extra_that_exists():
+    sources = [path for room in ROOMS.split("|") for path in (ROOT / room).rglob("*.py")]
+    texts = [path.read_text(encoding="utf-8") for path in [*sources, *PAGES]]
+    named = {name for text in texts for name in re.findall(r"fusion-localization\[(\w+)\]", text)}
+    assert named <= extras(), named - extras()
+    assert named
