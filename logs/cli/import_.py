@@ -30,8 +30,8 @@ def import_recordings(kind: str, folder: Path, output: Path, **options: Any) -> 
 
     ``output`` ending in ``.mcap`` is one log, and the folder must hold one run; else a folder that gets one log a run.
     The kind `rosbag` takes a file as well, and the ``options`` of `logs.importers.rosbag.recordings`. What is
-    lost or doubtful stands on stderr. Raises `RecordingError` for an unknown kind, a folder without such files, or a file that cannot be
-    understood, `ParameterError` for options that the kind does not take.
+    lost or doubtful stands on stderr. Raises `RecordingError` for an unknown kind, a folder without such files, or a
+    file that cannot be understood, `ParameterError` for options that the kind does not take.
     """
     if kind not in KINDS:
         raise RecordingError(f"there is no importer {kind!r}; {did_you_mean(kind, KINDS)}")

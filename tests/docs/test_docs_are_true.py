@@ -2,6 +2,7 @@
 
 import importlib
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -89,3 +90,23 @@ def test_every_test_named_exists(page):
             assert name in [path.stem for path in paths], name
         else:
             assert any(test == name or (end and test.startswith(name)) for test in tests), name
+
+
+def extras():
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)["project"]["optional-dependencies"].keys() - {"test"}
+
+
+def test_readme_lists_every_extra_with_its_size():
+    (table,) = re.findall(
+        r"^\| extra \|.*\n((?:\|.*\n)+)", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert set(re.findall(r"^\| `?(\w+)`? \|.* \d+ \|$", table, re.MULTILINE)) == {*extras(), "none"}
+
+
+def test_every_remedy_names_an_extra_that_exists():
+    sources = [path for room in ROOMS.split("|") for path in (ROOT / room).rglob("*.py")]
+    texts = [path.read_text(encoding="utf-8") for path in [*sources, *PAGES]]
+    named = {name for text in texts for name in re.findall(r"fusion-localization\[(\w+)\]", text)}
+    assert named <= extras(), named - extras()
+    assert named
