@@ -84,9 +84,9 @@ class Diverges(Wheels):
 class Poisoned(Wheels):
     """Right for one second, then no number at all."""
 
-    def estimate(self, state, time_ns):
-        answer = super().estimate(state, time_ns)
-        return answer if state.steps <= 10 else answer._replace(pose=Pose(*[math.nan] * 3))
+    def estimate(self, state, motion, time_ns):
+        answer = super().estimate(state, motion, time_ns)
+        return answer if time_ns <= 10 * TENTH_NS else answer._replace(pose=Pose(*[math.nan] * 3))
 
 
 @pytest.fixture(autouse=True)

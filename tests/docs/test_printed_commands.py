@@ -20,6 +20,9 @@ ADDED = {
 EXIT_CODES = {"fusion repair": {3}, "fusion doctor": {0, 1}}
 """Where it is not 0: a cut-off log has lost something; a computer may lack what a robot's has."""
 ELSEWHERE = {
+    "python3 -m venv": "an environment; `.ci/base` makes one",
+    ". venv/bin/activate": "it acts on the shell alone",
+    "pip install": "it needs a network; `.ci/base` installs the package",
     "make demo": "sets up an environment; `.ci/run` runs it",
     "make test": "these tests",
     "fusion bench run": "half a minute; tests/benchmarks/runner",

@@ -149,10 +149,10 @@ def test_certificate_covers_the_estimate_at_every_epoch(change):
     assert one != other
 
 
-def test_certificate_asks_for_an_estimate_at_epochs_alone():
+def test_certificate_asks_for_an_estimate_at_epochs_and_at_the_end_alone():
     estimator = Ledger()
     digest(updates_of(estimator, STREAM))
-    assert estimator.asked == len(SCANS_MS)
+    assert estimator.asked == len(SCANS_MS) + 1
 
 
 def test_certificate_so_far_is_the_digest_of_the_updates_so_far():

@@ -512,7 +512,7 @@ def test_ranging_inverts():
     assert float(model.distance(model.expected(4.2))) == pytest.approx(4.2, rel=1e-12)
 
 
-@pytest.mark.parametrize("code", ["import fusion", "import fusion.cli; fusion.cli.main(['--help'])"])
+@pytest.mark.parametrize("code", ["import fusion", "import fusion.cli.main; fusion.cli.main.main(['--help'])"])
 def test_start_up_imports_nothing_heavy(code):
     heavy = {"rerun", "scipy", "filterpy", "matplotlib", "mcap", "rich"}
     ask = f"{code}\nimport sys; print(); print(*sys.modules)"

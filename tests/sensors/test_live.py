@@ -236,7 +236,7 @@ def test_with_nothing_left_to_say_it_ends(robot):
 def test_a_disk_that_fills_up_ends_the_recording_and_not_the_pose(robot, tmp_path, monkeypatch):
     full = threading.Event()
     monkeypatch.setattr(rolling_log, "free_bytes", lambda _: 1e6 if full.is_set() else 1e12)
-    monkeypatch.setattr("sensors.onboard.recording.DISK_S", 0.3)
+    monkeypatch.setattr("sensors.onboard.recorder.DISK_S", 0.3)
     full_robot = robot(record="min_free_mb = 100.0")
     told = []
     with closing(live(full_robot, "ekf", folder=tmp_path / "out", duration_s=2.0)) as poses:

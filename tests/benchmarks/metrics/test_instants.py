@@ -136,7 +136,8 @@ def test_track_with_an_answer_that_is_no_number_has_no_answer_at_all():
 
 def _claiming(covariance, **claimed):
     update = update_at(SECOND)
-    return Track.of([update._replace(estimate=update.estimate._replace(covariance=covariance, **claimed))])
+    claim = update.estimate._replace(covariance=covariance, **claimed)
+    return Track.of([Update(update.measurement, claim, update.fates)])
 
 
 def test_covariance_that_is_no_number_is_a_flaw_and_one_that_is_not_claimed_is_none():

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import fusion
+from benchmarks.cli import reproduce as module
 from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors
-from benchmarks.paper import reproduce as module
 from benchmarks.paper.claims import in_words
 from benchmarks.paper.experiment import run_experiments
 from benchmarks.paper.figures import FIGURES

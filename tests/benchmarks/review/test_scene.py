@@ -87,8 +87,8 @@ class Silent(Straight):
 class Poisoned(Straight):
     """No number from the fifth scan on."""
 
-    def estimate(self, state, time_ns):
-        answer = super().estimate(state, time_ns)
+    def estimate(self, state, motion, time_ns):
+        answer = super().estimate(state, motion, time_ns)
         return answer if state < 5 else answer._replace(pose=answer.pose._replace(x=math.nan))
 
 

@@ -203,6 +203,6 @@ def test_cell_whose_dask_worker_died_is_not_done_rather_than_crashed(lone_worker
 
 
 def test_scheduler_that_does_not_answer_is_told(tmp_path, monkeypatch):
-    monkeypatch.setattr("benchmarks.runner.cluster.PATIENCE_S", 1.0)
+    monkeypatch.setattr("benchmarks.runner.dask_cluster.PATIENCE_S", 1.0)
     with pytest.raises(FusionError, match="no scheduler answers"):
         run_suite(suite_of(SUITE, tmp_path), Store(tmp_path / "store"), dask="tcp://127.0.0.1:9")

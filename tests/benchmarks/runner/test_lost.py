@@ -8,9 +8,10 @@ import fusion
 from benchmarks.cli import bench_run as run_verb
 from benchmarks.report.report_data import Material
 from benchmarks.report.tables import fixes, leaderboard, limits, lost
-from benchmarks.runner import results as stored
+from benchmarks.runner import leaderboard as stored
 from benchmarks.runner.execute import carry_out
 from benchmarks.runner.plan import cells_of
+from benchmarks.runner.results import read_results
 from benchmarks.runner.store import Store
 from benchmarks.runner.suite import load_suite
 from estimators.dead_reckoning import DeadReckoning
@@ -47,8 +48,8 @@ class Poisoned(DeadReckoning):
 
     __module__ = DeadReckoning.__module__  # a suite hashes the code of an estimator's package, and tests are none
 
-    def estimate(self, state, time_ns):
-        answer = super().estimate(state, time_ns)
+    def estimate(self, state, motion, time_ns):
+        answer = super().estimate(state, motion, time_ns)
         return answer if time_ns < nanoseconds(2.0) else answer._replace(pose=Pose(*[math.nan] * 3))
 
 
@@ -61,7 +62,7 @@ def material(request, tmp_path_factory):
         cells = cells_of(suite, store)
         for cell in cells:
             carry_out((cell, store.folder))
-        yield Material(suite, stored.read_results(cells, store), store)
+        yield Material(suite, read_results(cells, store), store)
 
 
 def of(material, contestant, fault="clean"):
