@@ -107,7 +107,10 @@ def test_viewer_that_ends_at_once_is_told_with_the_remedy(tmp_path, monkeypatch)
     pytest.importorskip("rerun", reason="needs the extra `review`")
     scene = tmp_path / "review.rrd"
     scene.write_bytes(b"")
-    monkeypatch.setattr(viewer, "program", lambda: "false")
+    stub = tmp_path / "viewer"
+    stub.write_text("#!/bin/sh\nexit 1\n")
+    stub.chmod(0o755)
+    monkeypatch.setattr(viewer, "program", lambda: str(stub))
     with pytest.raises(ViewerError, match=r"mesa-vulkan-drivers.*it ended with exit code 1: no message"):
         render([scene], tmp_path / "review.png")
     assert not (tmp_path / "review.png").exists()
