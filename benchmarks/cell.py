@@ -20,7 +20,7 @@ from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.innovations import innovation_metrics, nis_metrics
 from benchmarks.metrics.matching import availability, match
 from benchmarks.metrics.score import Errors, errors, for_json, metrics, metrics_of_lost, unanswered
-from benchmarks.runner.estimator_run import Lane, run_lane
+from benchmarks.runner.estimator_run import EstimatorRun, run_estimator
 from logs.reader import read_run
 from logs.run import Run
 from logs.truth import evaluation_instants
@@ -88,33 +88,33 @@ def cached_run(path: Path) -> Run:
 def score_cell(cell: Cell) -> Score:
     """Run the estimator and judge it. Raises `LogError` for the log; what the estimator does is in the score."""
     run = cached_run(cell.path)
-    return score_lane(cell, run, run_lane(run, cell.estimator, cell.options, cell.seed))
+    return score_run(cell, run, run_estimator(run, cell.estimator, cell.options, cell.seed))
 
 
-def score_lane(cell: Cell, run: Run, lane: Lane) -> Score:
-    """The score of a lane that was already run."""
-    measured = _errors(run, lane)
-    ended = _outcome(lane, measured)
-    answered = {} if measured is not None else for_json({"availability": availability(lane.track)})
-    facts = {**_facts(cell, run), **answered, **_cost(run, lane)}
+def score_run(cell: Cell, run: Run, estimator_run: EstimatorRun) -> Score:
+    """The score of an estimator that has run."""
+    measured = _errors(run, estimator_run)
+    ended = _outcome(estimator_run, measured)
+    answered = {} if measured is not None else for_json({"availability": availability(estimator_run.track)})
+    facts = {**_facts(cell, run), **answered, **_cost(run, estimator_run)}
     return Score(run.name, cell.estimator, *ended, measured, facts)
 
 
 def crashed(cell: Cell, error: str) -> Score:
     """The score of a cell whose process did not survive."""
     run = cached_run(cell.path)
-    lane = Lane(cell.estimator, (), "", 0.0, error)
-    return Score(run.name, cell.estimator, "crashed", error, _errors(run, lane), _facts(cell, run))
+    estimator_run = EstimatorRun(cell.estimator, (), "", 0.0, error)
+    return Score(run.name, cell.estimator, "crashed", error, _errors(run, estimator_run), _facts(cell, run))
 
 
-def _errors(run: Run, lane: Lane) -> Errors | None:
+def _errors(run: Run, estimator_run: EstimatorRun) -> Errors | None:
     """None without truth. An estimator that crashed gave no answer at all: half a run is not a result."""
     if run.truth is None:
         return None
     instants = evaluation_instants(run.truth)
     if len(instants.time_ns) == 0:
         return None
-    return errors(instants, match(instants, lane.track))
+    return errors(instants, match(instants, estimator_run.track))
 
 
 class Outcome(NamedTuple):
@@ -124,14 +124,16 @@ class Outcome(NamedTuple):
     error: str | None = None
 
 
-def _outcome(lane: Lane, measured: Errors | None) -> Outcome:
-    if lane.error is not None:
-        return Outcome("crashed", lane.error)
-    return outcome_of(lane.track, math.nan if measured is None else float(np.isfinite(measured.position).mean()))
+def _outcome(estimator_run: EstimatorRun, measured: Errors | None) -> Outcome:
+    if estimator_run.error is not None:
+        return Outcome("crashed", estimator_run.error)
+    return outcome_of(
+        estimator_run.track, math.nan if measured is None else float(np.isfinite(measured.position).mean())
+    )
 
 
 def outcome_of(track: Track, availability: float) -> Outcome:
-    """How a lane that did not crash ended, from the share of instants with a valid answer; NaN without truth."""
+    """How an estimator that did not crash ended, from the share of instants with a valid answer; NaN without truth."""
     if track.flaw:
         return Outcome("diverged", track.flaw)
     if math.isnan(availability):
@@ -154,18 +156,18 @@ def _facts(cell: Cell, run: Run) -> dict[str, object]:
     }
 
 
-def _cost(run: Run, lane: Lane) -> dict[str, object]:
+def _cost(run: Run, estimator_run: EstimatorRun) -> dict[str, object]:
     """What needs no truth: digest, processor time, and of the last word on each measurement fates and, of an estimator
     that did not diverge, innovations.
     """
-    if lane.error is not None:
+    if estimator_run.error is not None:
         return {}
-    sound = not lane.track.flaw
+    sound = not estimator_run.track.flaw
     return {
-        "digest": lane.digest,
-        "cpu_s": lane.cpu_s,
-        "cpu_per_measurement_s": lane.cpu_s / len(run.measurements) if run.measurements else None,
-        "fates": lane.fates.counts,
-        "nis_mean": lane.fates.nis_mean if sound else None,
-        **(for_json({**innovation_metrics(lane.fates), **nis_metrics(lane.fates)}) if sound else {}),
+        "digest": estimator_run.digest,
+        "cpu_s": estimator_run.cpu_s,
+        "cpu_per_measurement_s": estimator_run.cpu_s / len(run.measurements) if run.measurements else None,
+        "fates": estimator_run.fates.counts,
+        "nis_mean": estimator_run.fates.nis_mean if sound else None,
+        **(for_json({**innovation_metrics(estimator_run.fates), **nis_metrics(estimator_run.fates)}) if sound else {}),
     }

@@ -22,7 +22,7 @@ from benchmarks.review.reviewed_run import own_log
 from benchmarks.review.scene import write_scene
 from benchmarks.review.window import has_display, open_viewer
 from benchmarks.runner.adhoc_suite import bench, pooled, remarks, write_records
-from benchmarks.runner.estimator_run import Lane
+from benchmarks.runner.estimator_run import EstimatorRun
 from benchmarks.runner.leaderboard import print_tables
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
@@ -90,20 +90,20 @@ def demo(
 def _draw(run: Run, folder: Path, seed: int) -> Drawn:
     """The review and its picture; the scores of the demo do not depend on them."""
     _tell("drawing the review")
-    lanes, scores = fold(run, {name: {} for name in fusion.available()}, seed)
+    estimator_runs, scores = fold(run, {name: {} for name in fusion.available()}, seed)
     scene, picture = None, folder / "review.png"
     try:
-        (scene,) = write_scene(folder / "review.rrd", run, lanes, scores)
+        (scene,) = write_scene(folder / "review.rrd", run, estimator_runs, scores)
         return Drawn(scene, render([scene], picture), rendered=True)
     except ViewerError as error:
-        return Drawn(scene, _draw_instead(run, lanes, scores, picture, error), rendered=False)
+        return Drawn(scene, _draw_instead(run, estimator_runs, scores, picture, error), rendered=False)
 
 
 def _draw_instead(
-    run: Run, lanes: Sequence[Lane], scores: Sequence[Score], picture: Path, why: ViewerError
+    run: Run, estimator_runs: Sequence[EstimatorRun], scores: Sequence[Score], picture: Path, why: ViewerError
 ) -> Path | None:
     try:
-        draw_plainly(run, lanes, scores, picture)
+        draw_plainly(run, estimator_runs, scores, picture)
     except FusionError as error:
         _tell(f"no picture: {why}; {error}")
         return None

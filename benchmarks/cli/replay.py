@@ -10,7 +10,7 @@ from pathlib import Path
 
 import fusion
 from benchmarks.cell import cached_run
-from benchmarks.runner.estimator_run import Lane, run_lane
+from benchmarks.runner.estimator_run import EstimatorRun, run_estimator
 from benchmarks.runner.replay_log import write_replay
 from fusion import LogError, ParameterError, PluginError
 from fusion.cli.arguments import not_negative
@@ -37,28 +37,28 @@ def replay(
         raise LogError(f"{output}: this is the log being replayed; give the output another name")
     recorded = cached_run(run)
     fusion.build(estimator, recorded.world, options)
-    lane = run_lane(recorded, estimator, options, seed)
-    if lane.error is not None:
-        raise PluginError(f"{estimator} did not survive {run}: {lane.error}")
+    made = run_estimator(recorded, estimator, options, seed)
+    if made.error is not None:
+        raise PluginError(f"{estimator} did not survive {run}: {made.error}")
     if verify is not None:
-        _verify(verify, lane)
+        _verify(verify, made)
     if output is not None:
-        certificate = {"digest": lane.digest, "estimator": estimator, "seed": str(seed)}
+        certificate = {"digest": made.digest, "estimator": estimator, "seed": str(seed)}
         certificate["parameters"] = json.dumps(dict(options or {}), sort_keys=True)
-        write_replay(recorded, lane, output, {**recorded.metadata, **certificate})
-    return lane.digest
+        write_replay(recorded, made, output, {**recorded.metadata, **certificate})
+    return made.digest
 
 
-def _verify(earlier: Path, lane: Lane) -> None:
+def _verify(earlier: Path, made: EstimatorRun) -> None:
     metadata = read_run(earlier).metadata
-    kept = metadata.get("digest") or json.loads(metadata.get("live_digests", "{}")).get(lane.name)
+    kept = metadata.get("digest") or json.loads(metadata.get("live_digests", "{}")).get(made.name)
     if kept is None:
         raise LogError(
-            f"{earlier}: holds no digest of {lane.name}; give a log that `fusion replay` or `fusion live -o` wrote"
+            f"{earlier}: holds no digest of {made.name}; give a log that `fusion replay` or `fusion live -o` wrote"
         )
-    if kept != lane.digest:
+    if kept != made.digest:
         raise LogError(
-            f"{earlier}: its digest is {kept}, this replay's is {lane.digest}; compare seed, parameters and versions"
+            f"{earlier}: its digest is {kept}, this replay's is {made.digest}; compare seed, parameters and versions"
         )
 
 

@@ -45,7 +45,7 @@ class Track(NamedTuple):
 
     @classmethod
     def of(cls, updates: Sequence[Update], true_stamps: Mapping[Key, int] = MappingProxyType({})) -> Track:
-        """The columns of all updates of one lane, revisions among them; ``true_stamps`` as in `logs.run.Run`."""
+        """The columns of all updates of one estimator, revisions among them; ``true_stamps`` as in `logs.run.Run`."""
         stamps = [true_stamps.get(order(update.measurement), update.measurement.time_ns) for update in updates]
         told = list(zip(updates, stamps, strict=True))
         clocks = [BEFORE_ALL_NS if _is_bad_clock(update) else stamp for update, stamp in told]

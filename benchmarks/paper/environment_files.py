@@ -19,7 +19,7 @@ COMMAND = "fusion reproduce --calibrate FOLDER"
 ALTERNATIVES_FILE = "alternatives.toml"
 
 Key = tuple[str, str, str]
-"""Scenario, filling, lane."""
+"""Scenario, filling, estimator."""
 
 
 def write_calibrated(
@@ -38,9 +38,10 @@ def write_calibrated(
     texts = {env.scenario: scenario_text(env.place(scenarios)) for env in ENVIRONMENTS}
     tables = {name: tomllib.loads(text) for name, text in texts.items()}
     solved: dict[Key, Solved] = {}
-    for (environment, filling, lane), found in solve_all(tables, seeds, workers):
-        solved[environment.scenario, filling.key, lane] = found
-        told(f"{environment.title}, {filling.title}: {lane} errs {100.0 * found.reached_m:.1f} cm at {found.value:g}")
+    for (environment, filling, estimator), found in solve_all(tables, seeds, workers):
+        solved[environment.scenario, filling.key, estimator] = found
+        reached_cm = 100.0 * found.reached_m
+        told(f"{environment.title}, {filling.title}: {estimator} errs {reached_cm:.1f} cm at {found.value:g}")
     written = [
         _write(folder / f"{environment.scenario}.toml", _main_text(environment, texts, tables, solved, seeds))
         for environment in ENVIRONMENTS
@@ -66,7 +67,7 @@ def _main_text(
 ) -> str:
     import tomlkit
 
-    odometry, wifi = (solved[environment.scenario, MAIN.key, lane] for lane in (ODOMETRY, WIFI))
+    odometry, wifi = (solved[environment.scenario, MAIN.key, estimator] for estimator in (ODOMETRY, WIFI))
     table = filled(tables[environment.scenario], MAIN, odometry.value, wifi.value)
     table["calibration"] = _provenance(seeds) | {
         "odometry_factor": odometry.value,
@@ -103,7 +104,9 @@ def _alternatives_text(solved: Mapping[Key, Solved], seeds: range) -> str:
                 ODOMETRY: MAIN if filling.drives_like_main else filling,
                 WIFI: MAIN if filling.hears_like_main else filling,
             }
-            numbers = {lane: solved[environment.scenario, each.key, lane] for lane, each in source.items()}
+            numbers = {
+                estimator: solved[environment.scenario, each.key, estimator] for estimator, each in source.items()
+            }
             rows[filling.key] = {
                 "odometry_factor": numbers[ODOMETRY].value,
                 "odometry_max_reached_m": numbers[ODOMETRY].reached_m,

@@ -27,11 +27,11 @@ from sensors.simulation.scenario import Scenario, load_scenario
 class Outcome(NamedTuple):
     """What became of one environment, n seeds of p trial points [m].
 
-    ``errors``: (n, p, 2) by lane, infinite without a valid answer. ``refused``: (n, p), whether the proposed method
-    took the fix for an outlier. ``readings``, ``missing``, ``origins``: (n, ...), its largest error by each.
+    ``errors``: (n, p, 2) by estimator, infinite without a valid answer. ``refused``: (n, p), whether the proposed
+    method took the fix for an outlier. ``readings``, ``missing``, ``origins``: (n, ...), its largest error by each.
     ``moves``: (n, moves), straight ones as odometry measures them. ``alternatives``: largest errors (n,) by filling
     and curve. ``bound``: (p, 2, 2) [m^2], least covariance of a radio fix at each trial point. ``crashes``: why, by
-    lane, of the first run that crashed.
+    estimator, of the first run that crashed.
     """
 
     environment: Environment
@@ -47,17 +47,17 @@ class Outcome(NamedTuple):
     bound: Floats
     crashes: Mapping[str, str]
 
-    def largest(self, lane: str) -> Floats:
+    def largest(self, estimator: str) -> Floats:
         """The largest absolute coordinate error of each run, (n,) [m]: the paper's measure."""
-        return np.asarray(np.abs(self.errors[lane]).max(axis=(1, 2)))
+        return np.asarray(np.abs(self.errors[estimator]).max(axis=(1, 2)))
 
-    def coordinate(self, lane: str) -> Floats:
+    def coordinate(self, estimator: str) -> Floats:
         """The larger of both coordinate errors at each trial point, (n, p) [m]."""
-        return np.asarray(np.abs(self.errors[lane]).max(axis=2))
+        return np.asarray(np.abs(self.errors[estimator]).max(axis=2))
 
-    def euclidean(self, lane: str) -> Floats:
+    def euclidean(self, estimator: str) -> Floats:
         """The distance from the truth at each trial point, (n, p) [m]."""
-        return np.hypot(self.errors[lane][..., 0], self.errors[lane][..., 1])
+        return np.hypot(self.errors[estimator][..., 0], self.errors[estimator][..., 1])
 
     @property
     def moves_r2(self) -> Floats:
@@ -139,7 +139,7 @@ def _outcome(environment: Environment, seeds: range, scenarios: Path | None, res
         environment,
         scenario,
         tuple(seeds),
-        {lane: np.stack([trial.errors[lane] for trial in trials]) for lane in trials[0].errors},
+        {estimator: np.stack([trial.errors[estimator] for trial in trials]) for estimator in trials[0].errors},
         np.stack([trial.refused for trial in trials]),
         np.stack([trial.readings for trial in trials]),
         np.stack([trial.missing for trial in trials]),

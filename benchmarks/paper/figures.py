@@ -29,13 +29,13 @@ def errors(outcomes: Sequence[Outcome]) -> Figure:
     figure, row = panels(len(outcomes), 4.0)
     for axes, outcome in zip(row, outcomes, strict=True):
         typical, trial = typical_run(outcome), np.arange(1, outcome.refused.shape[1] + 1)
-        for lane, title in CURVES.items():
-            values, colour = 100.0 * outcome.coordinate(lane), _colour(lane)
+        for estimator, title in CURVES.items():
+            values, colour = 100.0 * outcome.coordinate(estimator), _colour(estimator)
             low, high = ([quantile(column, share) for column in values.T] for share in (0.05, 0.95))
             axes.fill_between(trial, low, high, color=colour, alpha=0.15, linewidth=0)
             named = None if axes is not row[0] else title
-            axes.plot(trial, values[typical], color=colour, marker=MARKERS[lane], markersize=4, label=named)
-            axes.axhline(100.0 * outcome.environment.maxima_m[lane], color=colour, linestyle=":", linewidth=1)
+            axes.plot(trial, values[typical], color=colour, marker=MARKERS[estimator], markersize=4, label=named)
+            axes.axhline(100.0 * outcome.environment.maxima_m[estimator], color=colour, linestyle=":", linewidth=1)
         title = f"{outcome.environment.title}, seed {outcome.seeds[typical]}"
         label(axes, title, "trial", "absolute error, larger coordinate, cm")
         axes.set_ylim(0.0, None)
@@ -46,24 +46,27 @@ def errors(outcomes: Sequence[Outcome]) -> Figure:
 
 def typical_run(outcome: Outcome) -> int:
     """The run whose odometry and Wi-Fi maxima are nearest to the published ones; the proposed method has no say."""
-    away = [np.abs(np.log(outcome.largest(lane) / outcome.environment.maxima_m[lane])) for lane in (ODOMETRY, WIFI)]
+    away = [
+        np.abs(np.log(outcome.largest(estimator) / outcome.environment.maxima_m[estimator]))
+        for estimator in (ODOMETRY, WIFI)
+    ]
     return int(np.argmin(away[0] + away[1]))
 
 
 def estimators(outcomes: Sequence[Outcome]) -> Figure:
     """Largest error of every estimator: median and 90 % interval, the published maximum beside it."""
-    lanes = by_median(outcomes)[::-1]
+    estimators = by_median(outcomes)[::-1]
     figure, row = panels(len(outcomes), 4.6, sharey=True)
     for axes, outcome in zip(row, outcomes, strict=True):
-        for place, lane in enumerate(lanes):
-            median, low, high = (100.0 * value for value in Spread.of(outcome.largest(lane)))
-            axes.plot([low, high], [place, place], color=_colour(lane), linewidth=2)
-            axes.plot(median, place, marker="o", color=_colour(lane))
+        for place, estimator in enumerate(estimators):
+            median, low, high = (100.0 * value for value in Spread.of(outcome.largest(estimator)))
+            axes.plot([low, high], [place, place], color=_colour(estimator), linewidth=2)
+            axes.plot(median, place, marker="o", color=_colour(estimator))
         axes.axvline(100.0 * outcome.environment.proposed_max_m, color="black", linestyle=":", linewidth=1)
         axes.set_xscale("log")
         plain_ticks(axes.xaxis)
         label(axes, outcome.environment.title, "largest coordinate error, cm (dotted: published)", "")
-    row[0].set_yticks(range(len(lanes)), lanes)
+    row[0].set_yticks(range(len(estimators)), estimators)
     return figure
 
 
@@ -78,9 +81,9 @@ def readings(outcomes: Sequence[Outcome]) -> Figure:
                 where = np.full(len(own), place + shift)
                 named = None if place or axes is not row[0] else ("feedback" if feedback else "no feedback")
                 axes.scatter(where, medians[own], s=22, facecolor=filled, edgecolor=_colour(PROPOSED), label=named)
-        for lane in CURVES:
-            published = 100.0 * outcome.environment.maxima_m[lane]
-            axes.axhline(published, color=_colour(lane), linestyle=":", linewidth=1)
+        for estimator in CURVES:
+            published = 100.0 * outcome.environment.maxima_m[estimator]
+            axes.axhline(published, color=_colour(estimator), linestyle=":", linewidth=1)
         axes.set_yscale("log")
         plain_ticks(axes.yaxis)
         axes.set_xticks(range(len(SCALES)), SCALES)
@@ -159,6 +162,6 @@ FIGURES: Mapping[str, Callable[[Sequence[Outcome]], Figure]] = {
 }
 
 
-def _colour(lane: str) -> tuple[float, float, float]:
+def _colour(estimator: str) -> tuple[float, float, float]:
     """The estimator's colour everywhere; on a gyro it keeps it."""
-    return plain_colour(lane.partition(" ")[0])
+    return plain_colour(estimator.partition(" ")[0])

@@ -16,8 +16,8 @@ import numpy as np
 
 from benchmarks.paper.assumptions import ALTERNATIVES, MAIN, Filling, Table, filled, short
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, WIFI, Environment
-from benchmarks.paper.trial import lane_errors, largest
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.paper.trial import largest, track_errors
+from benchmarks.runner.estimator_run import run_estimator
 from benchmarks.runner.workers import Loss, compute
 from fusion import FusionError
 from sensors.simulation.scenario import Scenario
@@ -31,16 +31,16 @@ TOLERANCE = 0.01
 
 
 class Unknown(NamedTuple):
-    """One number to be solved for: how strongly a lane errs in an environment, filled in one way."""
+    """One number to be solved for: how strongly a estimator errs in an environment, filled in one way."""
 
     environment: Environment
     filling: Filling
-    lane: str
+    estimator: str
 
     @property
     def target_m(self) -> float:
         """The published maximum [m]."""
-        return self.environment.maxima_m[self.lane]
+        return self.environment.maxima_m[self.estimator]
 
 
 class Solved(NamedTuple):
@@ -51,25 +51,25 @@ class Solved(NamedTuple):
 
 
 def unknowns() -> list[Unknown]:
-    """All there are: a filling that changes nothing for a lane has the main one's number."""
+    """All there are: a filling that changes nothing for a estimator has the main one's number."""
     fillings = [(filling, filling is MAIN) for filling in (MAIN, *ALTERNATIVES)]
     return [
-        Unknown(environment, filling, lane)
+        Unknown(environment, filling, estimator)
         for environment in ENVIRONMENTS
         for filling, is_main in fillings
-        for lane, like_main in ((ODOMETRY, filling.drives_like_main), (WIFI, filling.hears_like_main))
+        for estimator, like_main in ((ODOMETRY, filling.drives_like_main), (WIFI, filling.hears_like_main))
         if is_main or not like_main
     ]
 
 
 def largest_error(unknown: Unknown, table: Table, value: float, seed: int) -> float:
-    """The largest absolute coordinate error [m] of one run at one ``value``, sensors the lane does not use off."""
-    numbers = (value, 1.0) if unknown.lane == ODOMETRY else (1.0, value)
+    """The largest absolute coordinate error [m] of one run at one ``value``, sensors the estimator does not use off."""
+    numbers = (value, 1.0) if unknown.estimator == ODOMETRY else (1.0, value)
     quiet = filled(table, unknown.filling, *numbers)
     quiet["reality"]["gyro_hz"] = 0.0
-    quiet["reality"] |= {"ticks_hz": 0.0} if unknown.lane == WIFI else {"scans_at_stop": 1}
+    quiet["reality"] |= {"ticks_hz": 0.0} if unknown.estimator == WIFI else {"scans_at_stop": 1}
     run = simulated_run(Scenario.from_table(unknown.environment.scenario, quiet), seed)
-    return largest(lane_errors(run, run_lane(run, unknown.lane, seed=seed)))
+    return largest(track_errors(run, run_estimator(run, unknown.estimator, seed=seed)))
 
 
 def solve(task: tuple[Unknown, Table, range]) -> Solved:
@@ -88,11 +88,12 @@ def solve(task: tuple[Unknown, Table, range]) -> Solved:
     def excess(log_value: float) -> float:
         return math.log(median_m(short(math.exp(log_value))) / unknown.target_m)
 
-    low, high = map(math.log, BRACKETS[unknown.lane])
+    low, high = map(math.log, BRACKETS[unknown.estimator])
     if not excess(low) < 0.0 < excess(high):
         raise FusionError(
-            f"{unknown.environment.title}, {unknown.filling.title}: no value between {BRACKETS[unknown.lane]} makes "
-            f"{unknown.lane} err {unknown.target_m} m; change floor, route or anchors of {unknown.environment.scenario}"
+            f"{unknown.environment.title}, {unknown.filling.title}: no value between "
+            f"{BRACKETS[unknown.estimator]} makes {unknown.estimator} err {unknown.target_m} m; change "
+            f"floor, route or anchors of {unknown.environment.scenario}"
         )
     value = short(math.exp(brentq(excess, low, high, xtol=TOLERANCE)))
     return Solved(value, short(median_m(value)))

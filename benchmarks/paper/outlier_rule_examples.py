@@ -45,11 +45,11 @@ def origin_example() -> list[Moved]:
     """Odometry says x = 2 m, the fix 2.5 m: an outlier, until the map's origin is moved."""
     told = []
     for offset_m in OFFSETS_M:
-        lane = _Lane(PROPOSED, Pose(STANDS_M[0] + offset_m, STANDS_M[1] + offset_m, 0.0), offset_m)
-        decision = lane.fix(FIX_M[0] + offset_m, FIX_M[1] + offset_m)
+        one = _Driven(PROPOSED, Pose(STANDS_M[0] + offset_m, STANDS_M[1] + offset_m, 0.0), offset_m)
+        decision = one.fix(FIX_M[0] + offset_m, FIX_M[1] + offset_m)
         x = STANDS_M[0] + offset_m
         percent = 100.0 * (FIX_M[0] - STANDS_M[0]) / x
-        told.append(Moved(offset_m, x, percent, decision is Decision.REJECTED, lane.pose.x - offset_m))
+        told.append(Moved(offset_m, x, percent, decision is Decision.REJECTED, one.pose.x - offset_m))
     return told
 
 
@@ -58,21 +58,21 @@ def lock_out_example() -> list[Leg]:
 
     Before and after, odometry and fixes are exact.
     """
-    lanes, truth, refused, legs = (_Lane(PROPOSED, START), _Lane(REPAIRED, START)), START, 0, list[Leg]()
+    driven, truth, refused, legs = (_Driven(PROPOSED, START), _Driven(REPAIRED, START)), START, 0, list[Leg]()
     for trial in range(1, 4 * LAPS + 1):
         truth = truth.compose(Pose(SQUARE_M, 0.0, 0.0))
         counted_m = SQUARE_M + (SLIP_M if trial == SLIPPING_LEG else 0.0)
-        decision, _ = [lane.corner(counted_m, truth) for lane in lanes]
+        decision, _ = [one.corner(counted_m, truth) for one in driven]
         refused = refused + 1 if decision is Decision.REJECTED else 0
-        errors = [math.dist(lane.pose[:2], truth[:2]) for lane in lanes]
+        errors = [math.dist(one.pose[:2], truth[:2]) for one in driven]
         legs.append(Leg(trial, errors[0], errors[1], refused))
         truth = truth.compose(Pose(0.0, 0.0, math.pi / 2.0))
-        for lane in lanes:
-            lane.drive(0.0, math.pi / 2.0)
+        for one in driven:
+            one.drive(0.0, math.pi / 2.0)
     return legs
 
 
-class _Lane:
+class _Driven:
     """One estimator, fed one measurement a second."""
 
     def __init__(self, name: str, start: Pose, offset_m: float = 0.0) -> None:

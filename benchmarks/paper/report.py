@@ -52,11 +52,11 @@ class Report(NamedTuple):
 
     @property
     def remarks(self) -> list[str]:
-        """What the tables cannot say: why a lane crashed."""
+        """What the tables cannot say: why a estimator crashed."""
         return [
-            f"{outcome.environment.title}: {lane} crashed: {why}"
+            f"{outcome.environment.title}: {estimator} crashed: {why}"
             for outcome in self.outcomes
-            for lane, why in outcome.crashes.items()
+            for estimator, why in outcome.crashes.items()
         ]
 
     def record(self) -> dict[str, object]:
@@ -82,8 +82,10 @@ def _environment(outcome: Outcome) -> dict[str, object]:
         "calibration": dict(outcome.scenario.calibration),
         "published_max_m": outcome.environment.maxima_m,
         "bound_rms_m": _number(tables.bound_rms_m(outcome)),
-        "largest_m": {lane: _numbers(outcome.largest(lane)) for lane in outcome.errors},
-        "largest_euclidean_m": {lane: _numbers(outcome.euclidean(lane).max(axis=1)) for lane in outcome.errors},
+        "largest_m": {estimator: _numbers(outcome.largest(estimator)) for estimator in outcome.errors},
+        "largest_euclidean_m": {
+            estimator: _numbers(outcome.euclidean(estimator).max(axis=1)) for estimator in outcome.errors
+        },
         "refused": [int(count) for count in outcome.refused.sum(axis=1)],
         "origins_m": {str(offset_m): _spread(outcome.origins[:, k]) for k, offset_m in enumerate(ORIGINS_M)},
         "alternatives_m": {

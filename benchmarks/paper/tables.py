@@ -50,12 +50,12 @@ def maxima(outcomes: Sequence[Outcome]) -> Sheet:
         (
             f"{outcome.environment.title} (n = {outcome.environment.path_loss_exponent:g}, "
             f"{outcome.environment.trial_points} points), {title}",
-            cm(outcome.environment.maxima_m[lane]),
-            spread_cm(outcome.largest(lane)),
-            spread_cm(outcome.euclidean(lane).max(axis=1)),
+            cm(outcome.environment.maxima_m[estimator]),
+            spread_cm(outcome.largest(estimator)),
+            spread_cm(outcome.euclidean(estimator).max(axis=1)),
         )
         for outcome in outcomes
-        for lane, title in CURVES.items()
+        for estimator, title in CURVES.items()
     ]
     head = ("largest error, cm", "paper", "ours, per coordinate", "ours, Euclidean")
     return Sheet("Maximum error (section IV): median and 90 % interval over seeds", head, tuple(rows))
@@ -102,8 +102,15 @@ def table_1(outcomes: Sequence[Outcome]) -> Sheet:
 def estimators(outcomes: Sequence[Outcome]) -> Sheet:
     """Every estimator on the same runs, the best first."""
     rows = [
-        (lane, *(text for outcome in outcomes for text in (spread_cm(outcome.largest(lane)), cm(_rmse(outcome, lane)))))
-        for lane in by_median(outcomes)
+        (
+            estimator,
+            *(
+                text
+                for outcome in outcomes
+                for text in (spread_cm(outcome.largest(estimator)), cm(_rmse(outcome, estimator)))
+            ),
+        )
+        for estimator in by_median(outcomes)
     ]
     bound = ("Cramér-Rao bound of a fix", *(text for outcome in outcomes for text in ("–", cm(bound_rms_m(outcome)))))
     head = ("", *(text for o in outcomes for text in (f"{o.environment.short}\nlargest, cm", "RMSE, cm")))
@@ -112,13 +119,16 @@ def estimators(outcomes: Sequence[Outcome]) -> Sheet:
 
 
 def by_median(outcomes: Sequence[Outcome]) -> list[str]:
-    """The lanes, the best first: by the product over environments of their median largest errors."""
-    medians = {lane: [Spread.of(outcome.largest(lane)).median for outcome in outcomes] for lane in outcomes[0].errors}
-    return sorted(medians, key=lambda lane: (math.prod(medians[lane]), lane))
+    """The estimators, the best first: by the product over environments of their median largest errors."""
+    medians = {
+        estimator: [Spread.of(outcome.largest(estimator)).median for outcome in outcomes]
+        for estimator in outcomes[0].errors
+    }
+    return sorted(medians, key=lambda estimator: (math.prod(medians[estimator]), estimator))
 
 
-def _rmse(outcome: Outcome, lane: str) -> float:
-    return math.sqrt(float(np.mean(outcome.euclidean(lane) ** 2)))
+def _rmse(outcome: Outcome, estimator: str) -> float:
+    return math.sqrt(float(np.mean(outcome.euclidean(estimator) ** 2)))
 
 
 def bound_rms_m(outcome: Outcome) -> float:
@@ -181,7 +191,7 @@ def filling_curves(outcome: Outcome, key: str) -> Mapping[str, Floats]:
     """Largest errors (n,) [m] in a filling: odometry, Wi-Fi, EKF, and the proposed method by outlier scale."""
     if key != MAIN.key:
         return outcome.alternatives[key]
-    own = {lane: outcome.largest(lane) for lane in (ODOMETRY, WIFI, EKF)}
+    own = {estimator: outcome.largest(estimator) for estimator in (ODOMETRY, WIFI, EKF)}
     return own | {scale: outcome.readings[:, literal_of_scale(scale)] for scale in SCALES}
 
 

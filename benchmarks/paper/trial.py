@@ -1,4 +1,4 @@
-"""One run of one environment: what every lane, every reading and every origin makes of it, as small arrays."""
+"""One run of one environment: what every one, every reading and every origin makes of it, as small arrays."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from benchmarks.paper.interpretations import MISSING_OPTION, MISSING_VALUES, ORI
 from benchmarks.paper.published import EKF, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.straight_moves import measured_moves
 from benchmarks.paper.variants import leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
-from benchmarks.runner.estimator_run import Lane, run_lane
+from benchmarks.runner.estimator_run import EstimatorRun, run_estimator
 from fusion import Decision, WifiScan
 from fusion.arrays import Floats
 from logs.run import Run
@@ -26,14 +26,14 @@ from sensors.simulation.scenario import Scenario, load_scenario
 from sensors.simulation.simulate import simulated_run
 
 GYRO = " + gyro"
-GYRO_LANES = (ODOMETRY, PROPOSED, "bayes_weight", EKF)
+GYRO_ESTIMATORS = (ODOMETRY, PROPOSED, "bayes_weight", EKF)
 """Estimators that are also run on the turns of a gyro: the paper's future work, and the best filter beside it."""
 
 
 class Trial(NamedTuple):
-    """All results of one run [m]: errors (points, 2) by lane, infinite without a valid answer; whether the proposed
+    """All results of one run [m]: errors (points, 2) by one, infinite without a valid answer; whether the proposed
     method took a fix for an outlier, (points,); its largest error by reading, by what missing Wi-Fi counts, by origin;
-    straight moves as its odometry measures them; why a lane crashed, by lane.
+    straight moves as its odometry measures them; why a one crashed, by one.
     """
 
     errors: Mapping[str, Floats]
@@ -59,9 +59,9 @@ def point_errors(run: Run, track: Track) -> Floats:
     return np.where(answers.valid[:, None], away, np.inf)
 
 
-def lane_errors(run: Run, lane: Lane) -> Floats:
-    """`point_errors` of a lane; one that crashed gave no answer at all."""
-    return point_errors(run, lane.track)
+def track_errors(run: Run, one: EstimatorRun) -> Floats:
+    """`point_errors` of a one; one that crashed gave no answer at all."""
+    return point_errors(run, one.track)
 
 
 @lru_cache(maxsize=8)
@@ -81,17 +81,17 @@ def run_trial(task: tuple[str | Path, int], estimators: Sequence[str] | None = N
     scenario = _scenario(place)
     whole = simulated_run(scenario, seed)
     plain, aided = without_gyro(whole), with_gyro(whole, scenario.reality)
-    lanes = {name: (plain, run_lane(plain, name, seed=seed)) for name in sorted(chosen)}
-    lanes |= {name + GYRO: (aided, run_lane(aided, name, seed=seed)) for name in GYRO_LANES}
+    made = {name: (plain, run_estimator(plain, name, seed=seed)) for name in sorted(chosen)}
+    made |= {name + GYRO: (aided, run_estimator(aided, name, seed=seed)) for name in GYRO_ESTIMATORS}
     brief = leg_by_leg(plain)
     return Trial(
-        {name: lane_errors(*lane) for name, lane in lanes.items()},
-        _refused(lanes[PROPOSED][1]),
+        {name: track_errors(*one) for name, one in made.items()},
+        _refused(made[PROPOSED][1]),
         np.array([proposed_largest(brief, reading.options) for reading in READINGS]),
         np.array([proposed_largest(missing_wifi(brief, seed), {MISSING_OPTION: value}) for value in MISSING_VALUES]),
         np.array([proposed_largest(moved_by(brief, offset_m)) for offset_m in ORIGINS_M]),
         measured_moves(scenario, seed),
-        {name: lane.error for name, (_, lane) in lanes.items() if lane.error is not None},
+        {name: one.error for name, (_, one) in made.items() if one.error is not None},
     )
 
 
@@ -99,7 +99,9 @@ def run_alternative(task: tuple[Scenario, int]) -> Mapping[str, float]:
     """The largest error [m] in another filling: odometry, Wi-Fi, EKF, and the proposed method by outlier scale."""
     scenario, seed = task
     brief = leg_by_leg(without_gyro(simulated_run(scenario, seed)))
-    alone = {name: largest(lane_errors(brief, run_lane(brief, name, seed=seed))) for name in (ODOMETRY, WIFI, EKF)}
+    alone = {
+        name: largest(track_errors(brief, run_estimator(brief, name, seed=seed))) for name in (ODOMETRY, WIFI, EKF)
+    }
     return alone | {scale: proposed_largest(brief, {SCALE_OPTION: scale}) for scale in SCALES}
 
 
@@ -111,6 +113,6 @@ def proposed_largest(run: Run, options: Mapping[str, object] | None = None) -> f
     return largest(point_errors(run, Track.of(updates)))
 
 
-def _refused(lane: Lane) -> NDArray[np.bool_]:
-    scans = [update for update in lane.final if isinstance(update.measurement, WifiScan)]
+def _refused(one: EstimatorRun) -> NDArray[np.bool_]:
+    scans = [update for update in one.final if isinstance(update.measurement, WifiScan)]
     return np.array([any(fate.decision is Decision.REJECTED for fate in scan.fates) for scan in scans])

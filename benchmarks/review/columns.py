@@ -1,4 +1,4 @@
-"""What a lane said of itself and of its path, as columns for drawing: the final estimates alone, in time order."""
+"""The path of an estimator and what it claims of itself, as columns for drawing: final estimates, in time order."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fusion.arrays import Flags, Floats, Stamps, Whole
 
 
 class EstimateColumns(NamedTuple):
-    """The estimates of a lane in time order, all (n,): what they claim of themselves."""
+    """The estimates of an estimator in time order, all (n,): what they claim of themselves."""
 
     time_ns: Stamps
     valid: Flags
@@ -35,8 +35,8 @@ class EstimateColumns(NamedTuple):
 
 
 class DrawnTrack(NamedTuple):
-    """The valid positions of a lane, thinned: all (n,); ``covariance`` (n, 6) of (x, y, heading) row by row above the
-    diagonal [m², m rad, rad²], NaN where none is claimed.
+    """The valid positions of an estimator, thinned: all (n,); ``covariance`` (n, 6) of (x, y, heading) row by row
+    above the diagonal [m², m rad, rad²], NaN where none is claimed.
     """
 
     time_ns: Stamps

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from benchmarks.review.frame import Frame
-from benchmarks.runner.estimator_run import Lane, run_lane
+from benchmarks.runner.estimator_run import EstimatorRun, run_estimator
 from fusion import Measurement, ParameterError, Ranges, WifiScan
 from fusion.errors import did_you_mean
 from fusion.values import nanoseconds, seconds
@@ -75,7 +75,9 @@ def require_within(run: Run, at_s: float, option: str) -> None:
         )
 
 
-def ghost_lane(estimator: str, params: Mapping[str, object], counterfactual: Counterfactual, seed: int) -> Lane:
+def counterfactual_run(
+    estimator: str, params: Mapping[str, object], counterfactual: Counterfactual, seed: int
+) -> EstimatorRun:
     """What ``estimator`` would have made of it, named for both."""
-    lane = run_lane(counterfactual.run, estimator, params, seed)
-    return replace(lane, name=f"{estimator} {counterfactual.suffix}", ghost_of=estimator)
+    estimator_run = run_estimator(counterfactual.run, estimator, params, seed)
+    return replace(estimator_run, name=f"{estimator} {counterfactual.suffix}", counterfactual_of=estimator)

@@ -1,4 +1,4 @@
-"""One lane as it is drawn: everything it said turned into columns once, and its errors at the evaluation instants."""
+"""One estimator as it is drawn: its updates turned into columns once, and its errors at the evaluation instants."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from benchmarks.metrics.fates import FateColumns, fates_per_update
 from benchmarks.metrics.matching import Answers, match
 from benchmarks.review.columns import DrawnTrack, EstimateColumns
 from benchmarks.review.events import Events, States, events, states
-from benchmarks.runner.estimator_run import Lane
+from benchmarks.runner.estimator_run import EstimatorRun
 from benchmarks.runner.leaderboard import ranked
 from fusion import Decision, Reason
 from fusion.arrays import Floats, Whole
@@ -46,11 +46,11 @@ def signed_errors(instants: Instants, answers: Answers) -> SignedErrors:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A lane with its score. ``instants`` and ``answers`` belong together; they are
-    None where there is nothing to compare: no truth, or a lane that crashed.
+    """An estimator with its score. ``instants`` and ``answers`` belong together; they are
+    None where there is nothing to compare: no truth, or an estimator that crashed.
     """
 
-    lane: Lane
+    estimator_run: EstimatorRun
     score: Score
     shown: bool
     instants: Instants | None
@@ -58,38 +58,38 @@ class Drawing:
 
     @property
     def name(self) -> str:
-        """The lane's name."""
-        return self.lane.name
+        """Its name."""
+        return self.estimator_run.name
 
     @property
     def ghost(self) -> bool:
         """Whether it shows what would have been, and is drawn thin."""
-        return self.lane.ghost_of is not None
+        return self.estimator_run.counterfactual_of is not None
 
     @property
     def colour(self) -> Colour:
         """A ghost has the colour of what it is a ghost of."""
-        return colour_of(self.lane.ghost_of or self.lane.name)
+        return colour_of(self.estimator_run.counterfactual_of or self.estimator_run.name)
 
     @cached_property
     def track(self) -> DrawnTrack:
         """The path."""
-        return DrawnTrack.of_updates(self.lane.final, self.estimates.valid)
+        return DrawnTrack.of_updates(self.estimator_run.final, self.estimates.valid)
 
     @cached_property
     def estimates(self) -> EstimateColumns:
         """What it said of itself."""
-        return EstimateColumns.of_updates(self.lane.final)
+        return EstimateColumns.of_updates(self.estimator_run.final)
 
     @property
     def fates(self) -> FateColumns:
         """What became of the readings."""
-        return self.lane.fates
+        return self.estimator_run.fates
 
     @cached_property
     def fate_update(self) -> Whole:
-        """The index in ``Lane.final`` of the update that each of them belongs to, (m,)."""
-        return np.repeat(np.arange(len(self.lane.final)), fates_per_update(self.lane.final))
+        """The index in ``EstimatorRun.final`` of the update that each of them belongs to, (m,)."""
+        return np.repeat(np.arange(len(self.estimator_run.final)), fates_per_update(self.estimator_run.final))
 
     @cached_property
     def states(self) -> States:
@@ -99,7 +99,7 @@ class Drawing:
     @cached_property
     def events(self) -> Events:
         """What happened to it."""
-        return events(self.lane.final, self.estimates, self.fates)
+        return events(self.estimator_run.final, self.estimates, self.fates)
 
     @cached_property
     def gates(self) -> bool:
@@ -123,16 +123,16 @@ class Drawing:
         return [False] * 3 if self.errors is None else [bool(np.isfinite(v).any()) for v in self.errors.variance.T]
 
 
-def drawings(run: Run, lanes: Sequence[Lane], scores: Sequence[Score]) -> list[Drawing]:
-    """The lanes with their scores, one by one, the best first. A ghost is shown where its estimator is."""
+def drawings(run: Run, estimator_runs: Sequence[EstimatorRun], scores: Sequence[Score]) -> list[Drawing]:
+    """The estimators with their scores, one by one, the best first. A ghost is shown where its estimator is."""
     instants = None if run.truth is None else evaluation_instants(run.truth)
-    by_name = {lane.name: lane for lane in lanes}
+    by_name = {estimator_run.name: estimator_run for estimator_run in estimator_runs}
     ranking = [(by_name[score.estimator], score) for score in ranked(scores)]
-    best = [lane.name for lane, _ in ranking if lane.ghost_of is None][:SHOWN]
+    best = [estimator_run.name for estimator_run, _ in ranking if estimator_run.counterfactual_of is None][:SHOWN]
     drawn = []
-    for lane, score in ranking:
-        shown = (lane.ghost_of or lane.name) in best
-        compared = instants if score.errors is not None and lane.error is None else None
-        answers = None if compared is None else match(compared, lane.track)
-        drawn.append(Drawing(lane, score, shown, compared, answers))
+    for estimator_run, score in ranking:
+        shown = (estimator_run.counterfactual_of or estimator_run.name) in best
+        compared = instants if score.errors is not None and estimator_run.error is None else None
+        answers = None if compared is None else match(compared, estimator_run.track)
+        drawn.append(Drawing(estimator_run, score, shown, compared, answers))
     return drawn

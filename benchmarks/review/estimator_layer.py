@@ -25,12 +25,12 @@ GHOST_THICKNESS = 0.5
 
 
 def thickness(drawing: Drawing) -> float:
-    """How thick a lane is drawn."""
+    """How thick an estimator is drawn."""
     return GHOST_THICKNESS if drawing.ghost else 1.0
 
 
 def draw_on_map(canvas: Canvas, world: World, readings: Heard, drawing: Drawing, legend: tuple[float, float]) -> None:
-    """The lane's part of the map; ``legend``: its place in the legend."""
+    """The estimator's part of the map; ``legend``: its place in the legend."""
     place = ["map", "estimate", drawing.name]
     text = drawing.name if drawing.shown else f"{drawing.name} (hidden)"
     canvas.label(["map", "legend", drawing.name], text, drawing.colour, legend, radius=-6.0 * thickness(drawing))
@@ -86,7 +86,7 @@ def _draw_circles(canvas: Canvas, place: Place, world: World, readings: Heard, d
     estimator believed it wholly, vermillion when not at all.
     """
     fates, rr = drawing.fates, canvas.rr
-    radius_m = readings.radii(fates_of(drawing.lane.final))
+    radius_m = readings.radii(fates_of(drawing.estimator_run.final))
     asked = np.flatnonzero(~fates.met(Reason.KIND_NOT_CONSUMED))
     if not np.isfinite(radius_m[asked]).any():
         return
@@ -127,7 +127,7 @@ def newest(time_ns: Stamps, anchor: Codes, drawn: Flags, end_ns: int) -> tuple[S
 
 def _draw_particles(canvas: Canvas, place: Place, drawing: Drawing) -> None:
     """The clouds, the larger and the stronger the heavier a particle is among those of its cloud."""
-    clouds, rr = drawing.lane.clouds, canvas.rr
+    clouds, rr = drawing.estimator_run.clouds, canvas.rr
     if clouds is None:
         return
     starts = np.concatenate([[0], np.cumsum(clouds.lengths)[:-1]])

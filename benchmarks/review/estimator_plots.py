@@ -33,7 +33,7 @@ AXES = (Axis("x", "m", 1.0), Axis("y", "m", 1.0), Axis("heading", "°", float(np
 
 
 def draw_over_time(canvas: Canvas, world: World, frame: Frame, drawing: Drawing) -> None:
-    """All plots of one lane; of a ghost the errors alone."""
+    """All plots of one estimator; of a ghost the errors alone."""
     _draw_errors(canvas, drawing)
     if not drawing.ghost:
         _draw_consistency(canvas, drawing)
@@ -84,7 +84,7 @@ def _draw_nees(canvas: Canvas, drawing: Drawing) -> None:
 
 
 def _draw_effective_number(canvas: Canvas, drawing: Drawing) -> None:
-    clouds = drawing.lane.clouds
+    clouds = drawing.estimator_run.clouds
     if clouds is not None:
         look = (["neff", drawing.name], "effective particles", drawing.colour)
         canvas.line(*look, clouds.time_ns, clouds.effective_number)

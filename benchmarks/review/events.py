@@ -51,8 +51,8 @@ class Events(NamedTuple):
 
 
 def states(estimates: EstimateColumns, fates: FateColumns, fate_update: Whole) -> States:
-    """The states of a lane; none for a method that never judged a reading and was never lost. ``fate_update`` (m,):
-    the index of the estimate that each of ``fates`` led to.
+    """The states of an estimator; none for a method that never judged a reading and was never lost. ``fate_update``
+    (m,): the index of the estimate that each of ``fates`` led to.
     """
     judged = _judged(fates, fate_update, len(estimates.valid))
     last = np.maximum.accumulate(np.where(judged >= 0, np.arange(len(judged)), 0))

@@ -49,8 +49,8 @@ class Moment(NamedTuple):
 def worst_moments(
     run: Run, drawing: Drawing, start_ns: int, count: int, ghosts: Sequence[Drawing] = ()
 ) -> list[Moment]:
-    """The ``count`` worst moments of a lane, the worst first; none where nothing is judged. ``ghosts``: what it would
-    have been, whose errors at those moments are told by the ghosts' names.
+    """The ``count`` worst moments of an estimator, the worst first; none where nothing is judged. ``ghosts``: what it
+    would have been, whose errors at those moments stand under their names.
     """
     if drawing.instants is None or drawing.score.errors is None:
         return []
@@ -71,7 +71,7 @@ def _updates_before(drawing: Drawing, at_ns: int) -> Sequence[Update]:
     """Those just before ``at_ns``."""
     span_ns = (at_ns - nanoseconds(JUST_BEFORE_S), at_ns)
     first, end = np.searchsorted(drawing.estimates.time_ns, span_ns, side="right").tolist()
-    return drawing.lane.final[first:end]
+    return drawing.estimator_run.final[first:end]
 
 
 def _causes(run: Run, drawing: Drawing, recent: Sequence[Update], at_ns: int) -> Iterator[str]:

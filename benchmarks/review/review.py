@@ -19,7 +19,7 @@ from benchmarks.review.reviewed_run import own_log
 from benchmarks.review.scene import write_scene
 from benchmarks.review.viewer import require_rerun
 from benchmarks.review.window import has_display, open_viewer
-from benchmarks.runner.estimator_run import Lane
+from benchmarks.runner.estimator_run import EstimatorRun
 from fusion import ParameterError, ViewerError
 from fusion.cli.options import Settings, require_estimators, require_settings
 from fusion.output.files import require_place
@@ -82,24 +82,24 @@ def review(
     if at_s is not None:
         require_within(recorded, at_s, "--at")
     chosen = {name: settings.get(name, {}) for name in names}
-    lanes, scores = fold(recorded, chosen, seed, instead=counterfactuals(recorded, without, reject_s))
+    estimator_runs, scores = fold(recorded, chosen, seed, instead=counterfactuals(recorded, without, reject_s))
     files: list[Path] = []
     if save is not None or opens:
         # The viewer goes on reading after this program has ended, so its file has to stay.
-        files = write_scene(save or Path(tempfile.mkdtemp(prefix=PREFIX), SCENE), recorded, lanes, scores)
+        files = write_scene(save or Path(tempfile.mkdtemp(prefix=PREFIX), SCENE), recorded, estimator_runs, scores)
     if png is not None:
         with tempfile.TemporaryDirectory(prefix=PREFIX) as folder:
-            render(files or write_scene(Path(folder, SCENE), recorded, lanes, scores), png, at_s=at_s)
+            render(files or write_scene(Path(folder, SCENE), recorded, estimator_runs, scores), png, at_s=at_s)
     if opens:
         open_viewer(files, at_s=at_s)
-    return Review(files, _worst(recorded, lanes, scores, worst) if worst else [])
+    return Review(files, _worst(recorded, estimator_runs, scores, worst) if worst else [])
 
 
-def _worst(run: Run, lanes: Sequence[Lane], scores: Sequence[Score], count: int) -> list[Moment]:
+def _worst(run: Run, estimator_runs: Sequence[EstimatorRun], scores: Sequence[Score], count: int) -> list[Moment]:
     """Of every estimator, the best first; ghosts are compared, not searched."""
-    start_ns, drawn, found = Frame.around(run).start_ns, drawings(run, lanes, scores), []
+    start_ns, drawn, found = Frame.around(run).start_ns, drawings(run, estimator_runs, scores), []
     for drawing in drawn:
         if not drawing.ghost:
-            ghosts = [other for other in drawn if other.lane.ghost_of == drawing.name]
+            ghosts = [other for other in drawn if other.estimator_run.counterfactual_of == drawing.name]
             found += worst_moments(run, drawing, start_ns, count, ghosts)
     return found

@@ -26,7 +26,7 @@ from benchmarks.review.listing import line
 from benchmarks.review.moments import worst_moments
 from benchmarks.review.radio_circles import heard
 from benchmarks.review.viewer import require_rerun
-from benchmarks.runner.estimator_run import Lane
+from benchmarks.runner.estimator_run import EstimatorRun
 from benchmarks.runner.leaderboard import ranked
 from fusion.output.files import require_place, write
 from logs.run import Run
@@ -37,16 +37,20 @@ APPLICATION = "fusion"
 SUFFIX = ".rrd"
 
 
-def write_scene(output: Path, run: Run, lanes: Sequence[Lane], scores: Sequence[Score]) -> list[Path]:
-    """Write the review of ``run``, which brings its own layout; ``scores`` are those of ``lanes``.
+def write_scene(output: Path, run: Run, estimator_runs: Sequence[EstimatorRun], scores: Sequence[Score]) -> list[Path]:
+    """Write the review of ``run``, which brings its own layout; ``scores`` are those of ``estimator_runs``.
 
-    ``output``: one file when its name ends in ``.rrd``, else a folder for ``base.rrd`` and a file for each lane.
+    ``output``: one file when its name ends in ``.rrd``, else a folder for ``base.rrd`` and a file for each estimator.
     Answers the files, which are to be opened together. Raises `ViewerError` where Rerun is not installed,
     `FusionError` where a file cannot be written.
     """
     rr = require_rerun()
-    base, layers = files(output, [lane.name for lane in lanes])
-    frame, drawn, readings = Frame.around(run), drawings(run, lanes, scores), heard(run.world, run.measurements)
+    base, layers = files(output, [estimator_run.name for estimator_run in estimator_runs])
+    frame, drawn, readings = (
+        Frame.around(run),
+        drawings(run, estimator_runs, scores),
+        heard(run.world, run.measurements),
+    )
     axes, legend = _axes(drawn), frame.legend(1 + len(drawn))
     identity = f"{run.name} {run.world.hash[:12]}"
     with _recording(base, identity, blueprint(frame, run, drawn)) as recording:
@@ -66,12 +70,12 @@ def write_scene(output: Path, run: Run, lanes: Sequence[Lane], scores: Sequence[
     return [base, *layers.values()]
 
 
-def files(output: Path, lanes: Sequence[str]) -> tuple[Path, Mapping[str, Path]]:
-    """The file of the base layer, and those of the lanes by name: none where all is in one file."""
+def files(output: Path, estimator_runs: Sequence[str]) -> tuple[Path, Mapping[str, Path]]:
+    """The file of the base layer, and those of the estimators by name: none where all is in one file."""
     if output.suffix == SUFFIX:
         return output, {}
     # A name may hold what a file system cannot: "ekf without 02:00:5e:00".
-    return output / f"base{SUFFIX}", {name: output / f"{quote(name, safe=' ')}{SUFFIX}" for name in lanes}
+    return output / f"base{SUFFIX}", {name: output / f"{quote(name, safe=' ')}{SUFFIX}" for name in estimator_runs}
 
 
 @contextmanager

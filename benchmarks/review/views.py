@@ -129,7 +129,7 @@ def plot(name: str, origin: str, *, span: tuple[float, float] | None = None, leg
 
 
 def state_view(drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
-    """A lane for each estimator, coloured by its state."""
+    """A row for each estimator, coloured by its state."""
     import rerun as rr
     import rerun.blueprint as rrb
 

@@ -22,14 +22,14 @@ Watch: TypeAlias = Callable[[Fold, Moment], None]
 
 
 @dataclass(frozen=True)
-class Lane:
-    """What one estimator made of one run.
+class EstimatorRun:
+    """One estimator over one run.
 
     ``updates`` stand in the order of arrival, revisions among them; ``digest`` certifies them. ``cpu_s`` is the
     processor time of the fold alone. ``error`` is None, or why the estimator stopped: ``updates`` ends there then,
-    ``digest`` is empty and ``cpu_s`` zero. ``ghost_of``: of which estimator this is a counterfactual, None: of none.
-    ``clouds``: its particles, where somebody watched them.
-    ``true_stamps``: those of the run.
+    ``digest`` is empty and ``cpu_s`` zero. ``counterfactual_of``: the estimator whose counterfactual
+    this is, None for a run that took place. ``clouds``: its particles, where they were watched. ``true_stamps``: those
+    of the run.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Lane:
     digest: str
     cpu_s: float
     error: str | None
-    ghost_of: str | None = None
+    counterfactual_of: str | None = None
     clouds: Clouds | None = None
     true_stamps: Mapping[Key, int] = field(default_factory=dict)
 
@@ -64,14 +64,14 @@ def run_moments(run: Run) -> tuple[Moment, ...]:
     return tuple(moment for measurement in run.measurements for moment in timeline.push(measurement))
 
 
-def run_lane(
+def run_estimator(
     run: Run,
     estimator: str,
     options: Mapping[str, object] | None = None,
     seed: int = 0,
     *,
     watch: Watch | None = None,
-) -> Lane:
+) -> EstimatorRun:
     """Fold the measurements of ``run`` through the estimator of that name. Never raises for what a plug-in does."""
     updates: list[Update] = []
     certificate, error, cpu_s = "", None, 0.0
@@ -91,6 +91,6 @@ def run_lane(
         certificate = fusion.digest(updates)
     except FusionError as known:
         error = str(known)
-    except Exception as unknown:  # noqa: BLE001 - a plug-in may fail in any way, and costs only its own lane
+    except Exception as unknown:  # noqa: BLE001 - a plug-in may fail in any way, and costs only its own run
         error = f"{estimator} failed: {unknown!r}; leave it out with --estimators"
-    return Lane(estimator, tuple(updates), certificate, cpu_s, error, true_stamps=run.true_stamps)
+    return EstimatorRun(estimator, tuple(updates), certificate, cpu_s, error, true_stamps=run.true_stamps)

@@ -16,7 +16,7 @@ from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.innovations import innovation_metrics
 from benchmarks.review.frame import Frame
 from benchmarks.runner.archive import from_bytes, to_bytes
-from benchmarks.runner.estimator_run import Lane, run_lane
+from benchmarks.runner.estimator_run import EstimatorRun, run_estimator
 from benchmarks.runner.judge import judge, metrics_if_lost
 from benchmarks.runner.plan import Cell, has_estimate, read_faults
 from benchmarks.runner.reference import reference_of
@@ -70,7 +70,7 @@ def give_up(task: tuple[Cell, Path], loss: Loss) -> str:
     store = Store(folder)
     if not has_estimate(cell, store):
         _forget(cell, store)
-    keep(cell, store, Lane(cell.contestant.use, (), "", 0.0, LOST[loss]), None, ended=loss.value)
+    keep(cell, store, EstimatorRun(cell.contestant.use, (), "", 0.0, LOST[loss]), None, ended=loss.value)
     return score(cell, store)
 
 
@@ -80,9 +80,9 @@ def _forget(cell: Cell, store: Store) -> None:
     store.discard("estimates", cell.estimate_key)
 
 
-def fold(cell: Cell, run: Run) -> Lane:
+def fold(cell: Cell, run: Run) -> EstimatorRun:
     """What the contestant of a cell makes of its run, faults and all."""
-    return run_lane(run, cell.contestant.use, cell.contestant.params, cell.seed)
+    return run_estimator(run, cell.contestant.use, cell.contestant.params, cell.seed)
 
 
 def faulty_run(cell: Cell) -> Run:
@@ -95,22 +95,24 @@ def faulty_run(cell: Cell) -> Run:
     return apply_faults(named, faults, suite_seed=cell.suite_seed, fault_id=cell.fault.id, seed=cell.seed)
 
 
-def keep(cell: Cell, store: Store, lane: Lane, run: Run | None, ended: str = "crashed") -> None:
+def keep(cell: Cell, store: Store, estimator_run: EstimatorRun, run: Run | None, ended: str = "crashed") -> None:
     """Put the estimate of a cell into the store; ``run`` None: it was lost with its process."""
     result = {
         "cell": str(cell),
-        "ended": ended if lane.error else "ok",
-        "error": lane.error,
-        "digest": lane.digest,
+        "ended": ended if estimator_run.error else "ok",
+        "error": estimator_run.error,
+        "digest": estimator_run.digest,
         "measurements": 0 if run is None else len(run.measurements),
         "warnings": [] if run is None else list(run.warnings),
         "start_ns": None if run is None else Frame.around(run).start_ns,
-        "fates": lane.fates.counts,
-        "nis_mean": lane.fates.nis_mean,
+        "fates": estimator_run.fates.counts,
+        "nis_mean": estimator_run.fates.nis_mean,
         **_broken_limit(cell, ended),
     }
     store.write(
-        "estimates", cell.estimate_key, {"result.json": to_json(result), "track.npz": to_bytes(lane.track, lane.fates)}
+        "estimates",
+        cell.estimate_key,
+        {"result.json": to_json(result), "track.npz": to_bytes(estimator_run.track, estimator_run.fates)},
     )
 
 

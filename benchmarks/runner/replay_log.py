@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from benchmarks.metrics.estimate_track import Track
-from benchmarks.runner.estimator_run import Lane
+from benchmarks.runner.estimator_run import EstimatorRun
 from benchmarks.runner.execute import faulty_run, fold
 from benchmarks.runner.plan import Cell, cells_of
 from benchmarks.runner.store import Store
@@ -22,20 +22,22 @@ from logs.truth import TruthTrack
 from logs.writer import RunWriter
 
 
-def write_replay(run: Run, lane: Lane, output: Path, metadata: Mapping[str, str]) -> None:
+def write_replay(run: Run, estimator_run: EstimatorRun, output: Path, metadata: Mapping[str, str]) -> None:
     """A log of the messages in the order they came in, each followed by what the estimator said to it; from where it
     crashed on, of the messages alone.
     """
     truths = _truths(run.truth) if run.truth is not None else []
     now_ns, answered = 0, 0
     with RunWriter(output, run.world, name=run.name, prior=run.prior, metadata=metadata) as writer:
-        for update, received_ns in zip(lane.updates, Track.of(lane.updates).received_ns.tolist(), strict=True):
+        for update, received_ns in zip(
+            estimator_run.updates, Track.of(estimator_run.updates).received_ns.tolist(), strict=True
+        ):
             _write_until(writer, truths, received_ns)
             # The host answers every message with one update of its own; those after it are revisions.
             if not update.revised:
                 now_ns, answered = max(received_ns, 0), answered + 1
                 writer.write(update.measurement, log_time_ns=now_ns)
-            writer.write_update(lane.name, update)
+            writer.write_update(estimator_run.name, update)
         for measurement in run.measurements[answered:]:
             now_ns = max(now_ns, measurement.time_ns)
             _write_until(writer, truths, now_ns)
@@ -79,8 +81,13 @@ def replay_cell(cell: Cell, output: Path) -> str:
     answer the digest: "" where the contestant crashed, which the log then shows up to that moment.
     """
     run = faulty_run(cell)
-    lane = fold(cell, run)
-    about = {"estimator": cell.contestant.use, "seed": str(cell.seed), "fault": cell.fault.id, "digest": lane.digest}
+    estimator_run = fold(cell, run)
+    about = {
+        "estimator": cell.contestant.use,
+        "seed": str(cell.seed),
+        "fault": cell.fault.id,
+        "digest": estimator_run.digest,
+    }
     parameters = json.dumps(dict(cell.contestant.params), sort_keys=True)
-    write_replay(run, lane, output, {**run.metadata, **about, "parameters": parameters})
-    return lane.digest
+    write_replay(run, estimator_run, output, {**run.metadata, **about, "parameters": parameters})
+    return estimator_run.digest

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import fusion
-from benchmarks.cell import Cell, Score, score_lane
+from benchmarks.cell import Cell, Score, score_run
 from benchmarks.runner.adhoc_suite import bench, pooled, remarks, write_records
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from benchmarks.runner.leaderboard import print_tables, ranked
 from fusion import (
     Covariance,
@@ -274,7 +274,7 @@ def test_runs_without_truth_stay_out_of_the_table_of_all(tmp_path, capsys):
 def test_true_heading_that_is_known_in_part_is_told_with_its_number():
     heading = np.where(np.arange(60) < 45, 0.0, np.nan)
     run = run_in_memory(truth=TruthTrack(np.arange(60) * TENTH_NS, np.arange(60) * 0.1, np.zeros(60), heading))
-    score = score_lane(Cell(Path("run.mcap"), "toy_wheels", {}, 0), run, run_lane(run, "toy_wheels"))
+    score = score_run(Cell(Path("run.mcap"), "toy_wheels", {}, 0), run, run_estimator(run, "toy_wheels"))
     (remark,) = remarks([score])
     assert remark == "run: the true heading is known at 45 of 60 instants, and heading errors are of these alone"
     assert score.record()["head_n"] == 45.0
@@ -328,10 +328,10 @@ def test_same_cell_twice_gives_the_same_digest(tmp_path):
 
 
 def test_lane_keeps_what_was_said_before_the_crash():
-    lane = run_lane(run_in_memory(), "toy_dies")
-    assert len(lane.updates) == 30
-    assert "half way" in lane.error
-    assert len(lane.final) == 30
+    estimator_run = run_estimator(run_in_memory(), "toy_dies")
+    assert len(estimator_run.updates) == 30
+    assert "half way" in estimator_run.error
+    assert len(estimator_run.final) == 30
 
 
 def test_measurements_of_a_run_are_screened_and_integrated_once_for_all_its_lanes():
@@ -339,9 +339,11 @@ def test_measurements_of_a_run_are_screened_and_integrated_once_for_all_its_lane
     scans = tuple(ranges(k * TENTH_NS + 1, k) for k in range(5, 60, 5))
     measurements = tuple(sorted([*run_in_memory().measurements, *scans], key=order))
     run = run_in_memory(world=counting, measurements=measurements)
-    lanes = [run_lane(run, name, seed=seed) for name in ("toy_wheels", "toy_quiet") for seed in range(3)]
+    estimator_runs = [run_estimator(run, name, seed=seed) for name in ("toy_wheels", "toy_quiet") for seed in range(3)]
     assert counting.asked == dict.fromkeys("abc", len(scans))
-    first, *others = ([epoch for update in lane.updates for epoch in update.epochs] for lane in lanes)
+    first, *others = (
+        [epoch for update in estimator_run.updates for epoch in update.epochs] for estimator_run in estimator_runs
+    )
     assert len(first) == len(scans)
     for epochs in others:
         assert all(mine.motion is theirs.motion for mine, theirs in zip(epochs, first, strict=True))

@@ -1,4 +1,4 @@
-"""The particles of a lane: watched without changing it, a bounded number of them kept."""
+"""The particles of an estimator: watched without changing it, a bounded number of them kept."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.review.particle_clouds import MOST_CLOUDS, MOST_POINTS, CloudWatch, thinned
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from fusion import Epoch, Increment, Moment, Particles, Ranges, WifiScan
 from logs.reader import read_run
 from sensors.simulation.simulate import simulate
@@ -21,21 +21,21 @@ def run(tmp_path_factory):
 
 def test_watching_changes_nothing_and_keeps_the_cloud_of_every_scan(run):
     watch = CloudWatch(run)
-    lane = run_lane(run, "particle", {"particles": 300}, watch=watch)
-    assert lane.digest == run_lane(run, "particle", {"particles": 300}).digest
+    estimator_run = run_estimator(run, "particle", {"particles": 300}, watch=watch)
+    assert estimator_run.digest == run_estimator(run, "particle", {"particles": 300}).digest
     clouds = watch.clouds()
     scans = {m.time_ns for m in run.measurements if isinstance(m, WifiScan | Ranges)}
     assert clouds.cloud_ns.tolist() == clouds.time_ns.tolist() == sorted(scans)
     assert (clouds.lengths == 300).all()
     assert ((clouds.effective_number >= 1.0) & (clouds.effective_number <= 300.001)).all()
-    by_time = {update.estimate.time_ns: update.estimate for update in lane.final}
+    by_time = {update.estimate.time_ns: update.estimate for update in estimator_run.final}
     first = clouds.weights[:300] @ clouds.positions[:300]
     assert first == pytest.approx(by_time[int(clouds.cloud_ns[0])].pose[:2], abs=1e-9)
 
 
 def test_estimator_without_particles_has_no_clouds(run):
     watch = CloudWatch(run)
-    assert run_lane(run, "ekf", watch=watch).error is None
+    assert run_estimator(run, "ekf", watch=watch).error is None
     assert watch.clouds() is None
 
 
@@ -43,7 +43,7 @@ def test_particles_that_fail_cost_their_own_lane_alone(run):
     def refuse(fold, moment):
         raise ValueError("no particles today")
 
-    assert "no particles today" in run_lane(run, "ekf", watch=refuse).error
+    assert "no particles today" in run_estimator(run, "ekf", watch=refuse).error
 
 
 class Always:

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors, metrics
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from fusion import (
     Covariance,
     Odometry,
@@ -165,7 +165,7 @@ def test_filter_that_is_told_is_more_honest_and_better_in_a_simulated_office(nam
             table = json.loads(run.world.table)
             if not told:
                 del table["radio"]["shadowing_length_m"]
-            lane = run_lane(replace(run, world=World.from_table(table)), name, seed=0)
+            lane = run_estimator(replace(run, world=World.from_table(table)), name, seed=0)
             instants = evaluation_instants(run.truth)
             scores.append(metrics(errors(instants, match(instants, lane.track))))
         found[told] = [float(np.mean([score[key] for score in scores])) for key in ("pos_rmse", "anees")]

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.matching import match
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from fusion import Truth, World
 from fusion.cli.main import main
 from fusion.odometry import Odometer
@@ -148,7 +148,7 @@ def test_an_estimator_is_better_for_it_on_another_drive(drive):
 def rmse(run):
     """Of the EKF [m]."""
     instants = evaluation_instants(run.truth)
-    said = match(instants, Track.of(run_lane(run, "ekf", seed=0).updates))
+    said = match(instants, Track.of(run_estimator(run, "ekf", seed=0).updates))
     assert said.valid.mean() > 0.9
     return float(np.sqrt(np.nanmean(np.square(said.x - instants.x) + np.square(said.y - instants.y))))
 

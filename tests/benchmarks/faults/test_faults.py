@@ -15,7 +15,7 @@ from benchmarks.faults.motion_faults import WHEELS, BadStart, Freeze, GyroBias, 
 from benchmarks.faults.radio_faults import Nlos, Outlier, PowerStep, RssiNoise
 from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from fusion import Gyro, MeasurementError, Odometry, ParameterError, Ranges, RssiReading, WheelTicks, WifiScan
 from fusion.conformance.synthetic_run import Drive
 from fusion.odometry import Odometer
@@ -315,17 +315,17 @@ def test_faults_together_last_as_long_as_any_of_them():
 def short_run():
     """The first eleven seconds, and what a filter makes of them undamaged."""
     run = replace(RUN, measurements=tuple(m for m in RUN.measurements if is_in(m, ((0.0, 11.0),))))
-    return run, run_lane(run, "ekf")
+    return run, run_estimator(run, "ekf")
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_filter_lives_through_every_fault_and_answers_otherwise_than_without(kind, short_run):
     run, undamaged = short_run
     faulty = struck_by(read_fault({"kind": kind, **TABLES[kind]}, "faults[0]"), run=run)
-    lane = run_lane(faulty, "ekf")
-    assert lane.error is None
-    assert len(lane.updates) >= len(faulty.measurements) > 0
-    assert lane.digest != undamaged.digest
+    estimator_run = run_estimator(faulty, "ekf")
+    assert estimator_run.error is None
+    assert len(estimator_run.updates) >= len(faulty.measurements) > 0
+    assert estimator_run.digest != undamaged.digest
 
 
 # --- messages --------------------------------------------------------------------------------------------------------
@@ -425,10 +425,10 @@ def test_score_is_that_of_the_clean_run_for_who_ignores_the_sensor_with_the_wron
     """Odometry alone, its turns from the wheels: answers are as many, as early and as good, whatever clock is wrong."""
     run = replace(RUN, world=replace(RUN.world, robot=replace(RUN.world.robot, turn_source="wheels")))
     clean, faulty = (
-        run_lane(told, "dead_reckoning") for told in (run, struck_by(Clock(topic, offset_s=offset_s), run=run))
+        run_estimator(told, "dead_reckoning") for told in (run, struck_by(Clock(topic, offset_s=offset_s), run=run))
     )
     instants = evaluation_instants(run.truth)
-    expected, got = (errors(instants, match(instants, lane.track)) for lane in (clean, faulty))
+    expected, got = (errors(instants, match(instants, estimator_run.track)) for estimator_run in (clean, faulty))
     assert faulty.digest != clean.digest
     assert np.isfinite(expected.position).all()
     np.testing.assert_allclose(got.position, expected.position, rtol=0.0, atol=1e-12)

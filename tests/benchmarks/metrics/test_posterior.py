@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.limits.posterior_bound import eff_pcrlb, posterior_bound
 from benchmarks.metrics.matching import match
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from fusion import (
     Covariance,
     LogError,
@@ -231,8 +231,8 @@ def test_filter_that_models_everything_reaches_the_bound():
     errors, bounds = [], []
     for seed in range(40):
         run = noisy(seed)
-        instants, lane = evaluation_instants(run.truth), run_lane(run, "ekf", {"gate_probability": 1.0})
-        answers = match(instants, lane.track)
+        instants, estimator_run = evaluation_instants(run.truth), run_estimator(run, "ekf", {"gate_probability": 1.0})
+        answers = match(instants, estimator_run.track)
         errors.append(np.hypot(answers.x - instants.x, answers.y - instants.y)[1:])
         bounds.append(posterior_bound(run).error_m[1:])
     assert 0.94 < eff_pcrlb(np.array(errors), np.array(bounds)) < 1.06

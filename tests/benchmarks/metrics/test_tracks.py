@@ -20,7 +20,7 @@ def write(path, *lines):
     return path
 
 
-def log_at(path, *lanes, truth=True):
+def log_at(path, *estimator_runs, truth=True):
     with RunWriter(path, WORLD, name="run") as log:
         for k in range(5):
             time_ns = START_NS + k * 100_000_000
@@ -28,7 +28,7 @@ def log_at(path, *lanes, truth=True):
             log.write(odometry)
             if truth:
                 log.write_truth(Truth(time_ns, 0.1 * k, 0.2, None if k == 2 else 0.1 * k))
-            for name in lanes:
+            for name in estimator_runs:
                 claimed = Covariance.from_std(0.1, 0.2, 0.3)
                 estimate = Estimate(time_ns, Pose(0.1 * k + 0.5, 0.2, 0.3), claimed, valid=k != 1)
                 log.write_update(name, Update(odometry, estimate, ()))

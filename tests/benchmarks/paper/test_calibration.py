@@ -18,7 +18,7 @@ from benchmarks.paper.environment_files import (
 from benchmarks.paper.fit_environments import SEEDS, Solved, Unknown, solve, unknowns
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.variants import without_gyro
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from fusion import FusionError, WifiScan, WorldError
 from logs.truth import evaluation_instants
 from sensors.simulation.scenario import Scenario, load_scenario, scenario_text
@@ -84,7 +84,7 @@ def test_told_odometry_noise_covers_the_errors_it_is_told_of(environment):
     for seed in range(12):
         run = without_gyro(simulated_run(scenario, seed))
         instants = evaluation_instants(run.truth)
-        nees.append(score(instants, match(instants, run_lane(run, ODOMETRY).track)).nees_2d)
+        nees.append(score(instants, match(instants, run_estimator(run, ODOMETRY).track)).nees_2d)
     assert 0.2 < np.mean(nees) / 2.0 < 5.0
 
 
@@ -104,14 +104,14 @@ def test_what_cannot_be_solved_is_refused_with_a_remedy(monkeypatch):
 def test_nothing_is_solved_for_twice_and_never_on_the_proposed_method():
     asked = unknowns()
     assert len(set(asked)) == len(asked)
-    assert {unknown.lane for unknown in asked} == {ODOMETRY, WIFI}
+    assert {unknown.estimator_run for unknown in asked} == {ODOMETRY, WIFI}
     assert not any(unknown.target_m == unknown.environment.maxima_m[PROPOSED] for unknown in asked)
 
 
 def test_files_keep_their_comments_and_lead_back_to_the_same_scenarios(tmp_path, monkeypatch):
     numbers = {ODOMETRY: Solved(0.5, 0.24), WIFI: Solved(1.5, 0.82)}
     monkeypatch.setattr(
-        environment_files, "solve_all", lambda *_: ((unknown, numbers[unknown.lane]) for unknown in unknowns())
+        environment_files, "solve_all", lambda *_: ((unknown, numbers[unknown.estimator_run]) for unknown in unknowns())
     )
     told = []
     written = write_calibrated(tmp_path, told=told.append)

@@ -20,7 +20,7 @@ from benchmarks.paper.published import EKF, ENVIRONMENTS, ODOMETRY, PROPOSED, WI
 from benchmarks.paper.reproduce import reproduce
 from benchmarks.paper.trial import GYRO, GYRO_LANES, run_alternative, run_trial
 from benchmarks.paper.variants import with_gyro
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from fusion import ParameterError, WorldError
 from fusion.cli.main import main
 from fusion.output.tables import as_markdown
@@ -49,7 +49,9 @@ def test_a_seed_gives_its_run_whichever_is_the_first(report):
     (alone, *_) = run_experiments(1, seed=6)
     both = report.outcomes[0]
     assert alone.seeds == (6,)
-    assert all(np.array_equal(alone.errors[lane][0], both.errors[lane][1]) for lane in both.errors)
+    assert all(
+        np.array_equal(alone.errors[estimator_run][0], both.errors[estimator_run][1]) for estimator_run in both.errors
+    )
 
 
 def test_every_estimator_runs_on_the_same_runs_and_some_on_a_gyro(report):
@@ -80,8 +82,8 @@ def test_what_is_refused_leaves_the_answer_where_odometry_had_it(report):
 def test_alternative_of_the_main_scenario_is_the_trial_itself():
     scenario = load_scenario("paper_mec")
     brief, whole = run_alternative((scenario, 8)), run_trial(("paper_mec", 8))
-    for lane in (ODOMETRY, WIFI):
-        assert brief[lane] == pytest.approx(np.abs(whole.errors[lane]).max(), abs=1e-6)
+    for estimator_run in (ODOMETRY, WIFI):
+        assert brief[estimator_run] == pytest.approx(np.abs(whole.errors[estimator_run]).max(), abs=1e-6)
     assert brief["coordinate"] == pytest.approx(np.abs(whole.errors[PROPOSED]).max(), abs=1e-6)
 
 
@@ -146,7 +148,7 @@ def test_gyro_turns_are_nearer_the_truth_than_wheel_turns():
         run = simulated_run(scenario, seed)
         for told, into in ((run, wheels), (with_gyro(run, scenario.reality), gyro)):
             instants = evaluation_instants(told.truth)
-            into.append(errors(instants, match(instants, run_lane(told, ODOMETRY).track)).heading[-1])
+            into.append(errors(instants, match(instants, run_estimator(told, ODOMETRY).track)).heading[-1])
     assert np.median(gyro) < 0.5 * np.median(wheels)
 
 

@@ -9,9 +9,9 @@ import pytest
 from benchmarks.paper.interpretation_study import literal_of_scale
 from benchmarks.paper.interpretations import OPTIONS, READINGS, SCALES, literal
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
-from benchmarks.paper.trial import lane_errors
+from benchmarks.paper.trial import track_errors
 from benchmarks.paper.variants import MISSING_SHARE, leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from fusion import Gyro, Odometry, WifiScan
 from sensors.simulation.scenario import load_scenario
 from sensors.simulation.simulate import simulated_run
@@ -23,8 +23,8 @@ def plain(scenario="paper_office", seed=3):
     return without_gyro(simulated_run(load_scenario(scenario), seed))
 
 
-def errors(run, lane, **options):
-    return lane_errors(run, run_lane(run, lane, options))
+def errors(run, estimator_run, **options):
+    return track_errors(run, run_estimator(run, estimator_run, options))
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -39,12 +39,12 @@ def test_robot_drives_to_as_many_trial_points_as_the_paper_and_scans_at_each(sce
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-@pytest.mark.parametrize("lane", [ODOMETRY, WIFI, PROPOSED])
-def test_leg_by_leg_is_the_same_run_and_far_shorter(scenario, lane):
+@pytest.mark.parametrize("estimator_run", [ODOMETRY, WIFI, PROPOSED])
+def test_leg_by_leg_is_the_same_run_and_far_shorter(scenario, estimator_run):
     run = plain(scenario)
     brief = leg_by_leg(run)
     assert len(brief.measurements) == 4 * len(run.truth)
-    assert errors(brief, lane) == pytest.approx(errors(run, lane), abs=1e-6)
+    assert errors(brief, estimator_run) == pytest.approx(errors(run, estimator_run), abs=1e-6)
 
 
 def test_leg_by_leg_knows_the_distance_travelled_to_the_drift_of_the_legs():

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 import fusion
-from benchmarks.cell import Cell, score_lane
+from benchmarks.cell import Cell, score_run
 from benchmarks.review.particle_clouds import CloudWatch
 from benchmarks.review.scene import write_scene
-from benchmarks.runner.estimator_run import Lane
+from benchmarks.runner.estimator_run import EstimatorRun
 from fusion import (
     Covariance,
     Decision,
@@ -80,7 +80,7 @@ def watched(run: Run) -> CloudWatch:
     return watch
 
 
-def made_up_lane(run: Run, number: int) -> Lane:
+def made_up_run(run: Run, number: int) -> EstimatorRun:
     """Half a metre beside the truth; every twentieth reading is rejected."""
     covariance, updates = Covariance(0.25, 0.05, 0.0, 0.25, 0.0, 0.01), []
     for k, measurement in enumerate(run.measurements):
@@ -97,16 +97,18 @@ def made_up_lane(run: Run, number: int) -> Lane:
             )
         updates.append(Update(measurement, Estimate(measurement.time_ns, pose, covariance), fates))
     clouds = watched(run).clouds() if number < WITH_PARTICLES else None
-    return Lane(f"estimator {number}", tuple(updates), "", 0.0, None, clouds=clouds)
+    return EstimatorRun(f"estimator {number}", tuple(updates), "", 0.0, None, clouds=clouds)
 
 
 def cost_s(poses: int, estimators: int, output: Path) -> float:
     """Processor seconds of the writing alone."""
     run = long_run(poses)
-    lanes = [made_up_lane(run, number) for number in range(estimators)]
-    scores = [score_lane(Cell(run.path, lane.name, {}, 0), run, lane) for lane in lanes]
+    estimator_runs = [made_up_run(run, number) for number in range(estimators)]
+    scores = [
+        score_run(Cell(run.path, estimator_run.name, {}, 0), run, estimator_run) for estimator_run in estimator_runs
+    ]
     started_s = time.process_time()
-    write_scene(output, run, lanes, scores)
+    write_scene(output, run, estimator_runs, scores)
     return time.process_time() - started_s
 
 

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fusion
-from benchmarks.cell import Cell, score_lane
+from benchmarks.cell import Cell, score_run
 from benchmarks.review.drawing import drawings
 from benchmarks.review.error_causes import Growth
 from benchmarks.review.moments import SPACING_S, Moment, peaks, worst_moments
-from benchmarks.runner.estimator_run import Lane
+from benchmarks.runner.estimator_run import EstimatorRun
 from benchmarks.runner.review_command import review_command
 from fusion import Decision, Estimate, Fate, Odometry, Pose, RangeReading, Ranges, Reason, Truth, Update
 from fusion.cli.options import parse_settings
@@ -65,8 +65,8 @@ def test_peaks_hold_the_maximum_and_keep_their_distance(values, count):
 
 
 def moment_of(tmp_path, judge, *, odometry=lambda _: True, off_m=lambda *_: 0.0, **claims):
-    """The worst moment of a lane whose error peaks at 30 s; ``judge`` gives (anchor, decision, reason, NIS) rows for
-    each second, empty for no scan; ``off_m``: how wrong a reading is, by second and anchor.
+    """The worst moment of an estimator whose error peaks at 30 s; ``judge`` gives (anchor, decision, reason, NIS) rows
+    for each second, empty for no scan; ``off_m``: how wrong a reading is, by second and anchor.
     """
     truth = [Truth(s * SECOND_NS, 0.0, 0.0, 0.0) for s in range(LENGTH_S)]
     updates = []
@@ -82,9 +82,9 @@ def moment_of(tmp_path, judge, *, odometry=lambda _: True, off_m=lambda *_: 0.0,
     measurements = tuple(update.measurement for update in updates)
     track = TruthTrack.from_truths(truth)
     run = Run(tmp_path / "a run.mcap", "run", WORLD, None, {}, measurements, track, (), {})
-    lane = Lane("toy", tuple(updates), "", 0.0, None)
-    score = score_lane(Cell(run.path, "toy", {}, 0), run, lane)
-    (drawing,) = drawings(run, [lane], [score])
+    estimator_run = EstimatorRun("toy", tuple(updates), "", 0.0, None)
+    score = score_run(Cell(run.path, "toy", {}, 0), run, estimator_run)
+    (drawing,) = drawings(run, [estimator_run], [score])
     (moment,) = worst_moments(run, drawing, 0, 1)
     return moment
 
@@ -129,8 +129,8 @@ def one_anchor_at_a_time(tmp_path, truth):
     run = Run(
         tmp_path, "r", WORLD, None, {}, tuple(u.measurement for u in updates), TruthTrack.from_truths(truth), (), {}
     )
-    lane = Lane("toy", tuple(updates), "", 0.0, None)
-    (drawing,) = drawings(run, [lane], [score_lane(Cell(run.path, "toy", {}, 0), run, lane)])
+    estimator_run = EstimatorRun("toy", tuple(updates), "", 0.0, None)
+    (drawing,) = drawings(run, [estimator_run], [score_run(Cell(run.path, "toy", {}, 0), run, estimator_run)])
     return worst_moments(run, drawing, 0, 1)[0]
 
 
@@ -177,8 +177,8 @@ def test_command_can_be_pasted_and_names_parameters_and_a_seed_that_matters(tmp_
 def test_lane_that_crashed_has_no_moments(tmp_path):
     track = TruthTrack.from_truths([Truth(0, 0.0, 0.0, 0.0)])
     run = Run(tmp_path, "r", WORLD, None, {}, (), track, (), {})
-    lane = Lane("toy", (), "", 0.0, "on purpose")
-    (drawing,) = drawings(run, [lane], [score_lane(Cell(run.path, "toy", {}, 0), run, lane)])
+    estimator_run = EstimatorRun("toy", (), "", 0.0, "on purpose")
+    (drawing,) = drawings(run, [estimator_run], [score_run(Cell(run.path, "toy", {}, 0), run, estimator_run)])
     assert worst_moments(run, drawing, 0, 3) == []
     assert worst_moments(run, dataclasses.replace(drawing, instants=None), 0, 3) == []
 

@@ -48,8 +48,8 @@ def folded(run, names):
 
 
 def drawn(run, names):
-    lanes, scores = folded(run, names)
-    return figure(run, drawings(run, lanes, scores))
+    estimator_runs, scores = folded(run, names)
+    return figure(run, drawings(run, estimator_runs, scores))
 
 
 def lines(axes, colour):
@@ -58,10 +58,10 @@ def lines(axes, colour):
 
 def test_each_estimator_has_a_floor_with_its_track_the_truth_and_the_anchors(run):
     pytest.importorskip("matplotlib")
-    lanes, scores = folded(run, NAMES)
-    *maps, _ = figure(run, drawings(run, lanes, scores)).axes
+    estimator_runs, scores = folded(run, NAMES)
+    *maps, _ = figure(run, drawings(run, estimator_runs, scores)).axes
     assert len(maps) == len(NAMES)
-    for axes, drawing in zip(maps, drawings(run, lanes, scores), strict=True):
+    for axes, drawing in zip(maps, drawings(run, estimator_runs, scores), strict=True):
         p75_cm = 100.0 * drawing.score.metrics["pos_p75"]
         assert axes.get_title() == f"{drawing.name}: 75 % of errors below {p75_cm:.1f} cm"
         (track,), (truth,) = lines(axes, drawing.colour), lines(axes, TRUTH)
@@ -103,8 +103,10 @@ def test_run_without_truth_and_estimator_that_crashed_are_drawn_as_far_as_they_g
 
 def test_file_is_the_same_picture_each_time(run, tmp_path):
     pytest.importorskip("matplotlib")
-    lanes, scores = folded(run, NAMES)
-    first, second = (draw_plainly(run, lanes, scores, tmp_path / name).read_bytes() for name in ("1.png", "2.png"))
+    estimator_runs, scores = folded(run, NAMES)
+    first, second = (
+        draw_plainly(run, estimator_runs, scores, tmp_path / name).read_bytes() for name in ("1.png", "2.png")
+    )
     assert first == second
     width, height = struct.unpack(">II", first[16:24])
     assert width > 1000 < 2 * height

@@ -9,16 +9,16 @@ import pytest
 from scipy.special import gammaincinv
 
 import fusion
-from benchmarks.cell import Cell, score_lane
+from benchmarks.cell import Cell, score_run
 from benchmarks.review.blueprint import reach
 from benchmarks.review.canvas import MOST_POSES, mostly_jumps, thinned
-from benchmarks.review.counterfactual import ghost_lane, without_anchor
+from benchmarks.review.counterfactual import counterfactual_run, without_anchor
 from benchmarks.review.drawing import drawings
 from benchmarks.review.estimator_layer import PARTICLE_PIXELS, newest
 from benchmarks.review.estimator_plots import NEES_BOUNDS
 from benchmarks.review.particle_clouds import MOST_POINTS, CloudWatch
 from benchmarks.review.scene import markdown, write_scene
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from fusion import (
     Covariance,
     Decision,
@@ -112,8 +112,10 @@ def _estimators():
 
 
 def scored(run, names):
-    lanes = [run_lane(run, name) for name in names]
-    return lanes, [score_lane(Cell(run.path, lane.name, {}, 0), run, lane) for lane in lanes]
+    estimator_runs = [run_estimator(run, name) for name in names]
+    return estimator_runs, [
+        score_run(Cell(run.path, estimator_run.name, {}, 0), run, estimator_run) for estimator_run in estimator_runs
+    ]
 
 
 def review_of(tmp_path, *names, with_truth=True):
@@ -166,9 +168,14 @@ def test_run_in_unix_time_is_on_a_second_timeline_and_another_is_not(tmp_path):
 def test_particles_and_their_effective_number_are_drawn_where_an_estimator_shows_them(tmp_path):
     run = run_of(tmp_path)
     watch = CloudWatch(run)
-    lanes = [replace(run_lane(run, "particle", watch=watch), clouds=watch.clouds()), run_lane(run, "toy")]
-    scores = [score_lane(Cell(run.path, lane.name, {}, 0), run, lane) for lane in lanes]
-    (scene,) = write_scene(tmp_path / "review.rrd", run, lanes, scores)
+    estimator_runs = [
+        replace(run_estimator(run, "particle", watch=watch), clouds=watch.clouds()),
+        run_estimator(run, "toy"),
+    ]
+    scores = [
+        score_run(Cell(run.path, estimator_run.name, {}, 0), run, estimator_run) for estimator_run in estimator_runs
+    ]
+    (scene,) = write_scene(tmp_path / "review.rrd", run, estimator_runs, scores)
     chunks = chunks_of(scene)
     assert not {"/map/estimate/toy/particles", "/neff/toy"} & chunks.keys()
     _, positions = column(chunks, "/map/estimate/particle/particles", "positions")
@@ -334,8 +341,8 @@ def test_layers_together_hold_what_one_file_holds(tmp_path):
 
 def test_ghost_has_a_track_errors_and_a_row_in_the_table_and_nothing_else(tmp_path):
     run = run_of(tmp_path)
-    lanes, scores = ghosted(run)
-    *_, ghost = write_scene(tmp_path / "layers", run, lanes, scores)
+    estimator_runs, scores = ghosted(run)
+    *_, ghost = write_scene(tmp_path / "layers", run, estimator_runs, scores)
     name = r"toy\ without\ 02\:00\:5e\:00"
     own = {path for path in chunks_of(ghost) if not path.startswith("/__")}
     parts = {f"/map/estimate/{name}/{part}" for part in ("path", "trail", "pose", "error")}
@@ -344,10 +351,10 @@ def test_ghost_has_a_track_errors_and_a_row_in_the_table_and_nothing_else(tmp_pa
 
 
 def ghosted(run):
-    lanes, scores = scored(run, ["toy"])
+    estimator_runs, scores = scored(run, ["toy"])
     what_if = without_anchor(run, "02:00:5e:00")
-    ghost = ghost_lane("toy", {}, what_if, 0)
-    return [*lanes, ghost], [*scores, score_lane(Cell(run.path, ghost.name, {}, 0), what_if.run, ghost)]
+    ghost = counterfactual_run("toy", {}, what_if, 0)
+    return [*estimator_runs, ghost], [*scores, score_run(Cell(run.path, ghost.name, {}, 0), what_if.run, ghost)]
 
 
 def recordings(files):
@@ -382,23 +389,23 @@ def test_score_table_ranks_the_live_first_and_tells_the_crash(tmp_path):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
 def test_full_disk_is_one_error(tmp_path):
     run = run_of(tmp_path)
-    lanes, scores = scored(run, ["toy"])
+    estimator_runs, scores = scored(run, ["toy"])
     (tmp_path / "review.rrd").symlink_to("/dev/full")
     with pytest.raises(FusionError, match=r"review\.rrd: cannot be written \(No space left on device\)"):
-        write_scene(tmp_path / "review.rrd", run, lanes, scores)
+        write_scene(tmp_path / "review.rrd", run, estimator_runs, scores)
     (tmp_path / "layers").mkdir()
     (tmp_path / "layers" / "toy.rrd").symlink_to("/dev/full")
     with pytest.raises(FusionError, match=r"toy\.rrd: cannot be written \(No space left on device\)"):
-        write_scene(tmp_path / "layers", run, lanes, scores)
+        write_scene(tmp_path / "layers", run, estimator_runs, scores)
 
 
 def test_answer_that_is_no_number_is_told_beside_the_table_and_draws_no_error(tmp_path):
     with fusion.registered("poisoned", Poisoned):
-        lanes, scores = scored(run_of(tmp_path), ["poisoned", "toy"])
+        estimator_runs, scores = scored(run_of(tmp_path), ["poisoned", "toy"])
     row, told = markdown(scores).splitlines()[3], markdown(scores).splitlines()[-1]
     assert row.startswith("| poisoned (diverged) | – | – | ∞ |")
     assert told.startswith("poisoned diverged: it answers x nan m, y 0.5 m, heading 0 rad, 2 s after its first answer")
-    (scene,) = write_scene(tmp_path / "review.rrd", run_of(tmp_path), lanes, scores)
+    (scene,) = write_scene(tmp_path / "review.rrd", run_of(tmp_path), estimator_runs, scores)
     assert "/error/poisoned" not in chunks_of(scene)
     assert "/map/estimate/poisoned/path" in chunks_of(scene)
 

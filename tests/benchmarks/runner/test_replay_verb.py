@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from benchmarks.runner.execute import carry_out, faulty_run
 from benchmarks.runner.replay_log import one_cell, replay_cell
 from benchmarks.runner.store import Store
@@ -50,7 +50,7 @@ def test_log_of_a_cell_gives_the_same_answers_to_the_bit(suite, tmp_path, fault)
     assert digest
     log = read_run(tmp_path / "cell.mcap")
     assert log.measurements == faulty_run(cell).measurements
-    assert run_lane(log, "ekf", {"gate_probability": 0.99}, seed=1).digest == digest
+    assert run_estimator(log, "ekf", {"gate_probability": 0.99}, seed=1).digest == digest
 
 
 def test_command_compares_with_the_store_and_refuses_ids_with_the_nearest(suite, tmp_path, capsys):
