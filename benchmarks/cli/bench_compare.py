@@ -27,7 +27,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """One sentence per pair, then the numbers."""
     _, results = stored_results(arguments)
-    chosen = [one for one in results if not arguments.estimators or one.cell.contestant.id in arguments.estimators]
+    chosen = [one for one in results if not arguments.estimators or one.cell.estimator.id in arguments.estimators]
     _require(arguments, results)
     judged = comparison(chosen, arguments.metric, arguments.fault)
     for verdict in judged.verdicts:
@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _require(arguments: argparse.Namespace, results: Sequence[Result]) -> None:
-    ids = {result.cell.contestant.id for result in results}
+    ids = {result.cell.estimator.id for result in results}
     faults = {result.cell.fault.id for result in results}
     for what, asked, known in (
         ("estimator", arguments.estimators, ids),

@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
         sys.stdout.write(json.dumps({**counts, "keys": keys}, indent=1) + "\n")
         return 0
     sys.stdout.write(
-        f"{suite.name}: {len(suite.runs)} runs x {len(suite.contestants)} estimators x {len(suite.faults)} faults x "
+        f"{suite.name}: {len(suite.runs)} runs x {len(suite.estimators)} estimators x {len(suite.faults)} faults x "
         f"{suite.seeds} seeds = {len(cells)} cells\n"
         f"  {counts['cached']} cached, {counts['missing_estimates']} to compute, "
         f"{counts['missing_scores']} only to score\n"

@@ -10,7 +10,7 @@ from benchmarks.cli.suite_arguments import suite_options
 from benchmarks.metrics.catalogue import RANKED_BY, require_lower_is_better
 from benchmarks.report.figure_panel import without_targets
 from benchmarks.report.report import as_page, report
-from benchmarks.report.report_data import Material
+from benchmarks.report.report_data import ReportData
 from benchmarks.runner.results import require_metric, stored_results
 from benchmarks.runner.store import Store
 from fusion.output.figures import require_matplotlib
@@ -32,12 +32,12 @@ def run(arguments: argparse.Namespace) -> int:
     suite, results = stored_results(arguments)
     require_metric(arguments.metric, results)
     require_lower_is_better(arguments.metric)
-    material = Material(suite, results, Store(arguments.store), arguments.metric)
+    data = ReportData(suite, results, Store(arguments.store), arguments.metric)
     targets = {}
     if arguments.markdown:
-        targets[arguments.markdown] = without_targets(report(material, limit=arguments.limit)).encode()
+        targets[arguments.markdown] = without_targets(report(data, limit=arguments.limit)).encode()
     if arguments.html or not arguments.markdown:
-        targets[arguments.html or Path(f"{suite.name}.html")] = as_page(material, limit=arguments.limit)
+        targets[arguments.html or Path(f"{suite.name}.html")] = as_page(data, limit=arguments.limit)
     for path, content in targets.items():
         write(path, content)
         sys.stdout.write(f"{path}\n")

@@ -20,11 +20,11 @@ from fusion.output.tables import print_sheets
 
 
 def lost(results: Sequence[Result]) -> list[str]:
-    """Why contestants have no score in some cells: a sentence for each status they ended with, and its first reason."""
+    """Why estimators have no score in some cells: a sentence for each status they ended with, and its first reason."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for one in results:
         if one.status not in ALIVE:
-            reasons.setdefault((one.cell.contestant.id, one.status), []).append(one.error or one.status)
+            reasons.setdefault((one.cell.estimator.id, one.status), []).append(one.error or one.status)
     return [f"{name} lost {len(own)} of its cells: {_first(own)}" for (name, _), own in reasons.items()]
 
 

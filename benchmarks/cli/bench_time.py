@@ -20,7 +20,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, keep beside the store, print. Exit code 1 when no contestant has a time."""
+    """Measure, keep beside the store, print. Exit code 1 when no estimator has a time."""
     suite, store = opened(arguments)
     found = list(measure(suite, arguments.repeats))
     timings = sorted((one for one in found if isinstance(one, Timing)), key=lambda timing: timing.least_us)
@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     rows = {"timings": [one._asdict() for one in timings], "untimed": [one._asdict() for one in untimed]}
     write_json(store.folder / TIMING_FILE, {"machine": machine(), **rows})
     for one in untimed:
-        sys.stderr.write(f"fusion bench time: {one.contestant} has no time: {one.why}\n")
+        sys.stderr.write(f"fusion bench time: {one.estimator} has no time: {one.why}\n")
     head = ("µs per measurement", "least", "q25", "q75", "p50", "p95", "p99", "max", "CPU s per log s", "peak MB")
     print_sheets(
         [

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import fusion
 from benchmarks.cell import Score
 from benchmarks.report.report import as_page
-from benchmarks.report.report_data import Material
+from benchmarks.report.report_data import ReportData
 from benchmarks.review.folding import fold
 from benchmarks.review.picture import render
 from benchmarks.review.plain_picture import draw_plainly
@@ -115,10 +115,10 @@ def _report(suite: Path, folder: Path, workers: int | None) -> Path | None:
     """The page of a suite, of which only what is missing is computed."""
     loaded, store, page = load_suite(suite), Store(folder / "bench"), folder / "report.html"
     _tell(f"running the suite {loaded.name}: several runs, and a fault")
-    material = Material(loaded, run_suite(loaded, store, workers=workers), store)
+    data = ReportData(loaded, run_suite(loaded, store, workers=workers), store)
     try:
         _tell("writing its report")
-        write(page, as_page(material))
+        write(page, as_page(data))
     except FusionError as error:
         _tell(f"no report: {error}")
         return None

@@ -17,7 +17,7 @@ from benchmarks.paper.fit_environments import SEEDS
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI, Environment
 from benchmarks.paper.straight_moves import r_squared
 from benchmarks.paper.trial import Trial, run_alternative, run_trial
-from benchmarks.runner.workers import Loss, compute
+from benchmarks.runner.workers import TaskFailure, compute
 from fusion import FusionError, ParameterError
 from fusion.arrays import Floats
 from fusion.output.progress import Progress
@@ -126,7 +126,7 @@ def _run(job: Job) -> Any:  # noqa: ANN401 - a Trial, or a row of an alternative
     return job.work((job.scenario, job.seed))
 
 
-def _died(job: Job, _: Loss) -> Any:  # noqa: ANN401 - it never answers
+def _died(job: Job, _: TaskFailure) -> Any:  # noqa: ANN401 - it never answers
     raise FusionError(f"a worker process died on seed {job.seed}, twice; try --workers 1 to see why")
 
 

@@ -18,7 +18,7 @@ from benchmarks.paper.assumptions import ALTERNATIVES, MAIN, Filling, Table, fil
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, WIFI, Environment
 from benchmarks.paper.trial import largest, track_errors
 from benchmarks.runner.estimator_run import run_estimator
-from benchmarks.runner.workers import Loss, compute
+from benchmarks.runner.workers import TaskFailure, compute
 from fusion import FusionError
 from sensors.simulation.scenario import Scenario
 from sensors.simulation.simulate import simulated_run
@@ -31,7 +31,7 @@ TOLERANCE = 0.01
 
 
 class Unknown(NamedTuple):
-    """One number to be solved for: how strongly a estimator errs in an environment, filled in one way."""
+    """One number to be solved for: how strongly an estimator errs in an environment, filled in one way."""
 
     environment: Environment
     filling: Filling
@@ -51,7 +51,7 @@ class Solved(NamedTuple):
 
 
 def unknowns() -> list[Unknown]:
-    """All there are: a filling that changes nothing for a estimator has the main one's number."""
+    """All there are: a filling that changes nothing for an estimator has the main one's number."""
     fillings = [(filling, filling is MAIN) for filling in (MAIN, *ALTERNATIVES)]
     return [
         Unknown(environment, filling, estimator)
@@ -99,7 +99,7 @@ def solve(task: tuple[Unknown, Table, range]) -> Solved:
     return Solved(value, short(median_m(value)))
 
 
-def _died(task: tuple[Unknown, Table, range], _: Loss) -> Solved:
+def _died(task: tuple[Unknown, Table, range], _: TaskFailure) -> Solved:
     unknown = task[0]
     raise FusionError(
         f"a worker process died on {unknown.environment.title}, {unknown.filling.title}; calibrate with --workers 1 "

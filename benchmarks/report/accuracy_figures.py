@@ -10,8 +10,8 @@ import numpy as np
 from benchmarks.metrics.score import quantile
 from benchmarks.report.cell_links import nearest
 from benchmarks.report.figure_panel import Panel, height_of, peaks
-from benchmarks.report.report_data import Material
-from benchmarks.runner.results import by_contestant, by_run, score_matrix
+from benchmarks.report.report_data import ReportData
+from benchmarks.runner.results import by_estimator, by_run, score_matrix
 from fusion.output.figures import plain_colour
 
 LINES = ("-", "--", "-.", ":")
@@ -29,17 +29,17 @@ LEADING = 200
 """Points of a line that lead to their moment: two pixels apart."""
 
 
-def accuracy(material: Material) -> Iterator[Panel]:
+def accuracy(data: ReportData) -> Iterator[Panel]:
     """Distribution, and run by run."""
-    yield _cdf(material)
-    yield _paired(material)
+    yield _cdf(data)
+    yield _paired(data)
 
 
-def _cdf(material: Material) -> Panel:
+def _cdf(data: ReportData) -> Panel:
     """How often the error is below a distance; a curve ends at the availability, not at one."""
     panel = Panel("Error distribution, without faults", "position error, cm, log scale", "share of instants, %")
-    for name in material.contestants:
-        _distribution(panel, material, name)
+    for name in data.estimators:
+        _distribution(panel, data, name)
     panel.log("x")
     panel.axes.set_xlim(left=_beginning(*panel.axes.get_xlim()))
     panel.axes.set_ylim(0.0, 100.0)
@@ -47,9 +47,9 @@ def _cdf(material: Material) -> Panel:
     return panel
 
 
-def _distribution(panel: Panel, material: Material, name: str) -> None:
+def _distribution(panel: Panel, data: ReportData, name: str) -> None:
     """One curve. Each of its points is an instant of one of the runs, and leads there."""
-    own = [series for (_, other), series in material.series.items() if other == name]
+    own = [series for (_, other), series in data.series.items() if other == name]
     error_m = np.concatenate([series.error_m for series in own] or [np.zeros(0)])
     time_s = np.concatenate([series.time_s for series in own] or [np.zeros(0)])
     cell = np.repeat(np.arange(len(own)), [len(series.time_s) for series in own])
@@ -58,46 +58,46 @@ def _distribution(panel: Panel, material: Material, name: str) -> None:
         return
     error_cm, share = 100.0 * error_m[order], 100.0 * np.arange(1, len(order) + 1) / len(error_m)
     step = max(len(order) // LONGEST_LINE, 1)
-    panel.axes.plot(error_cm[::step], share[::step], **_style(material, name))
+    panel.axes.plot(error_cm[::step], share[::step], **_style(data, name))
     few = np.unique(np.linspace(0, len(order) - 1, LEADING).astype(int))
     for place, series in enumerate(own):
         at = few[cell[order[few]] == place]
         result = series.result
         said = f"{name}, {result.cell.run.id}"
-        panel.lead(error_cm[at], share[at], material.anchor(result), said, time_s[order[at]])
+        panel.lead(error_cm[at], share[at], data.anchor(result), said, time_s[order[at]])
 
 
-def _paired(material: Material) -> Panel:
+def _paired(data: ReportData) -> Panel:
     """The ranking metric of every run, joined run by run: what the verdicts are made of."""
-    grouped, names = by_contestant(material.results), material.contestants
-    medians = [np.median(score_matrix(grouped[name], material.metric), axis=1) for name in names]
-    scores = material.unit.factor * np.stack(medians, axis=1)
-    panel = Panel("Run by run, without faults", f"{material.axis}, log scale", "", height_of(len(names)))
+    grouped, names = by_estimator(data.results), data.estimators
+    medians = [np.median(score_matrix(grouped[name], data.metric), axis=1) for name in names]
+    scores = data.unit.factor * np.stack(medians, axis=1)
+    panel = Panel("Run by run, without faults", f"{data.axis}, log scale", "", height_of(len(names)))
     for row in scores:
         panel.axes.plot(row, range(len(row)), color="0.7", linewidth=1, zorder=1)
     for place, name in enumerate(names):
         known = np.isfinite(scores[:, place])
-        colour = plain_colour(material.use(name))
+        colour = plain_colour(data.use(name))
         panel.axes.scatter(scores[known, place], np.full(known.sum(), place), color=colour, s=24, zorder=2)
         for score, (run_id, cells) in zip(medians[place], by_run(grouped[name]).items(), strict=True):
-            said = f"{name}, {run_id}: {material.metric} {material.text(score)}"
-            result = nearest(cells, material.metric, score)
-            panel.lead(material.unit.factor * score, place, material.anchor(result), said)
+            said = f"{name}, {run_id}: {data.metric} {data.text(score)}"
+            result = nearest(cells, data.metric, score)
+            panel.lead(data.unit.factor * score, place, data.anchor(result), said)
     panel.rows(names)
     panel.log("x")
     return panel
 
 
-def over_time(material: Material) -> Iterator[Panel]:
+def over_time(data: ReportData) -> Iterator[Panel]:
     """Position error over time, run by run; gaps where there was no valid answer."""
-    for place, run_id in enumerate(material.scored_runs):
+    for place, run_id in enumerate(data.scored_runs):
         panel = Panel(run_id, "time since the start, s", "position error, cm, log scale")
-        for name in material.contestants:
-            if (series := material.series.get((run_id, name))) is not None:
+        for name in data.estimators:
+            if (series := data.series.get((run_id, name))) is not None:
                 time_s, error_cm = series.time_s, 100.0 * np.where(series.answers.valid, series.error_m, np.nan)
                 few, fewer = peaks(error_cm, LONGEST_LINE), peaks(error_cm, LEADING)
-                panel.axes.plot(time_s[few], error_cm[few], linewidth=1, **_style(material, name))
-                anchor, said = material.anchor(series.result), f"{name}, {run_id}"
+                panel.axes.plot(time_s[few], error_cm[few], linewidth=1, **_style(data, name))
+                anchor, said = data.anchor(series.result), f"{name}, {run_id}"
                 panel.lead(time_s[fewer], error_cm[fewer], anchor, said, time_s[fewer])
         panel.log("y")
         panel.axes.set_ylim(bottom=_beginning(*panel.axes.get_ylim()))
@@ -106,18 +106,18 @@ def over_time(material: Material) -> Iterator[Panel]:
         yield panel
 
 
-def cost(material: Material) -> Iterator[Panel]:
+def cost(data: ReportData) -> Iterator[Panel]:
     """Accuracy against processor time, where `fusion bench time` has measured it: lower left is better."""
-    grouped, x = by_contestant(material.results), "processor time per measurement, µs, log scale"
-    panel = Panel("Accuracy against cost", x, f"{material.axis}, log scale")
-    for rank, name in enumerate(material.contestants, 1):
-        score = quantile(np.median(score_matrix(grouped[name], material.metric), axis=1), 0.5)
-        if name in material.timing and np.isfinite(score):
-            place = (material.timing[name], material.unit.factor * score)
-            panel.axes.scatter(*place, color=plain_colour(material.use(name)), s=30, label=f"{rank} {name}")
+    grouped, x = by_estimator(data.results), "processor time per measurement, µs, log scale"
+    panel = Panel("Accuracy against cost", x, f"{data.axis}, log scale")
+    for rank, name in enumerate(data.estimators, 1):
+        score = quantile(np.median(score_matrix(grouped[name], data.metric), axis=1), 0.5)
+        if name in data.timing and np.isfinite(score):
+            place = (data.timing[name], data.unit.factor * score)
+            panel.axes.scatter(*place, color=plain_colour(data.use(name)), s=30, label=f"{rank} {name}")
             panel.axes.annotate(str(rank), place, textcoords="offset points", xytext=(4, 3), fontsize=8)
-            said = f"{name}: {material.metric} {material.text(score)}, {place[0]:.0f} µs"
-            panel.lead(*place, material.anchor(nearest(grouped[name], material.metric, score)), said)
+            said = f"{name}: {data.metric} {data.text(score)}, {place[0]:.0f} µs"
+            panel.lead(*place, data.anchor(nearest(grouped[name], data.metric, score)), said)
     panel.log("x")
     panel.log("y")
     if panel.axes.collections:
@@ -134,7 +134,7 @@ def _beginning(low: float, high: float) -> float:
     return max(low, min(LEAST_CM, high / 100.0))
 
 
-def _style(material: Material, name: str) -> dict[str, Any]:
+def _style(data: ReportData, name: str) -> dict[str, Any]:
     """The colour of the estimator, and a line that tells its neighbours from it without colour."""
-    line = LINES[material.contestants.index(name) % len(LINES)]
-    return {"color": plain_colour(material.use(name)), "linestyle": line, "label": name}
+    line = LINES[data.estimators.index(name) % len(LINES)]
+    return {"color": plain_colour(data.use(name)), "linestyle": line, "label": name}

@@ -6,7 +6,7 @@ import html
 import math
 from collections.abc import Sequence
 
-from benchmarks.report.report_data import Material
+from benchmarks.report.report_data import ReportData
 from benchmarks.report.worst import command
 from benchmarks.runner.results import Result
 from benchmarks.runner.suite import CLEAN, TUNE
@@ -49,22 +49,22 @@ def nearest_to(values: Sequence[float], value: float) -> int:
     return min(range(len(values)), key=lambda k: 0.0 if values[k] == value else abs(values[k] - value))
 
 
-def link(material: Material, text: str, result: Result) -> str:
+def link(data: ReportData, text: str, result: Result) -> str:
     """A number, in Markdown, that leads to the entry of a cell."""
-    return text if text == "–" else f"[{text}](#{material.anchor(result)})"
+    return text if text == "–" else f"[{text}](#{data.anchor(result)})"
 
 
-def link_all(material: Material, text: str, contestant: str) -> str:
-    """The same to all cells of a contestant."""
-    return text if text == "–" else f"[{text}](#{material.anchor_of_all(contestant)})"
+def link_all(data: ReportData, text: str, estimator: str) -> str:
+    """The same to all cells of an estimator."""
+    return text if text == "–" else f"[{text}](#{data.anchor_of_all(estimator)})"
 
 
-def entries(material: Material) -> str:
-    """All cells, folded by contestant, the best first: HTML without an empty line, one block to Markdown."""
-    grouped: dict[str, list[Result]] = {name: [] for name in material.contestants}
-    for result in material.results:
-        grouped[result.cell.contestant.id].append(result)
-    return "\n".join(_fold(material, name, own) for name, own in grouped.items())
+def entries(data: ReportData) -> str:
+    """All cells, folded by estimator, the best first: HTML without an empty line, one block to Markdown."""
+    grouped: dict[str, list[Result]] = {name: [] for name in data.estimators}
+    for result in data.results:
+        grouped[result.cell.estimator.id].append(result)
+    return "\n".join(_fold(data, name, own) for name, own in grouped.items())
 
 
 def counted(count: int, what: str) -> str:
@@ -76,23 +76,21 @@ def counted(count: int, what: str) -> str:
     return f"{count or 'no'} {what}{'' if count == 1 else 's'}"
 
 
-def _fold(material: Material, name: str, own: Sequence[Result]) -> str:
+def _fold(data: ReportData, name: str, own: Sequence[Result]) -> str:
     title = html.escape(f"{name}: {counted(len(own), 'cell')}")
-    head = f'<details id="{material.anchor_of_all(name)}"><summary>{title}</summary><ul>'
-    return "\n".join([head, *(_entry(material, result) for result in own), "</ul></details>"])
+    head = f'<details id="{data.anchor_of_all(name)}"><summary>{title}</summary><ul>'
+    return "\n".join([head, *(_entry(data, result) for result in own), "</ul></details>"])
 
 
-def _entry(material: Material, result: Result) -> str:
+def _entry(data: ReportData, result: Result) -> str:
     cell = result.cell
     where = [cell.run.id + (" (tune)" if cell.run.split == TUNE else "")]
     where += [] if cell.fault.id == CLEAN else [cell.fault.id]
-    where += [f"seed {cell.seed}"] if material.suite.seeds > 1 else []
+    where += [f"seed {cell.seed}"] if data.suite.seeds > 1 else []
     said = [result.status]
-    if material.metric in result.metrics:
-        said.append(f"{material.metric} {material.text(result.metrics[material.metric])}")
+    if data.metric in result.metrics:
+        said.append(f"{data.metric} {data.text(result.metrics[data.metric])}")
     if result.worst_at_s is not None:
         said.append(f"worst error {100.0 * result.metrics['pos_max']:.0f} cm at {result.worst_at_s:.1f} s")
     told = html.escape(f"{', '.join(where)}: {', '.join(said)}")
-    return (
-        f'<li id="{material.anchor(result)}">{told}<br><code>{html.escape(command(result, material.words))}</code></li>'
-    )
+    return f'<li id="{data.anchor(result)}">{told}<br><code>{html.escape(command(result, data.words))}</code></li>'

@@ -12,8 +12,8 @@ import numpy as np
 from benchmarks.metrics.innovations import NAMES, Banded
 from benchmarks.report.figure_panel import Panel, height_of
 from benchmarks.report.innovations import nis_of_cells
-from benchmarks.report.report_data import Material
-from benchmarks.runner.results import Result, by_contestant
+from benchmarks.report.report_data import ReportData
+from benchmarks.runner.results import Result, by_estimator
 from fusion.arrays import Floats
 from fusion.output.figures import plain_colour
 
@@ -23,14 +23,14 @@ Judged = tuple[Result, Banded]
 """A cell, and the mean of what is judged of it."""
 
 
-def consistency(material: Material) -> Iterator[Panel]:
+def consistency(data: ReportData) -> Iterator[Panel]:
     """NEES of every cell without faults, and the NIS of every sensor in the runs that are shown."""
-    cells, nis = by_contestant(material.results), nis_of_cells(material)
-    nees = {name: [_nees(result) for result in cells[name]] for name in material.contestants}
-    yield from _drawn(material, "ANEES", "Answers: ANEES", nees)
+    cells, nis = by_estimator(data.results), nis_of_cells(data)
+    nees = {name: [_nees(result) for result in cells[name]] for name in data.estimators}
+    yield from _drawn(data, "ANEES", "Answers: ANEES", nees)
     for sensor in NAMES:
-        found = {name: list(_nis(material, nis, name, sensor)) for name in material.contestants}
-        yield from _drawn(material, f"mean NIS of {sensor}", f"Readings of {sensor}: mean NIS", found)
+        found = {name: list(_nis(data, nis, name, sensor)) for name in data.estimators}
+        yield from _drawn(data, f"mean NIS of {sensor}", f"Readings of {sensor}: mean NIS", found)
 
 
 def _nees(result: Result) -> Judged:
@@ -38,15 +38,15 @@ def _nees(result: Result) -> Judged:
 
 
 def _nis(
-    material: Material, found: Mapping[tuple[str, str], Mapping[str, Banded]], name: str, sensor: str
+    data: ReportData, found: Mapping[tuple[str, str], Mapping[str, Banded]], name: str, sensor: str
 ) -> Iterator[Judged]:
     for (run_id, own), told in found.items():
         if own == name and sensor in told:
-            yield material.series[run_id, own].result, told[sensor]
+            yield data.series[run_id, own].result, told[sensor]
 
 
-def _drawn(material: Material, what: str, title: str, found: Mapping[str, Sequence[Judged]]) -> Iterator[Panel]:
-    """A row for each contestant that has any."""
+def _drawn(data: ReportData, what: str, title: str, found: Mapping[str, Sequence[Judged]]) -> Iterator[Panel]:
+    """A row for each estimator that has any."""
     known = {name: [one for one in own if np.isfinite(one[1].mean)] for name, own in found.items()}
     shown = {name: own for name, own in known.items() if own}
     if not shown:
@@ -55,10 +55,10 @@ def _drawn(material: Material, what: str, title: str, found: Mapping[str, Sequen
     panel.axes.axvline(1.0, color="0.5", linewidth=1, zorder=1)
     for row, (name, own) in enumerate(shown.items()):
         places = row + np.linspace(-0.3, 0.3, len(own) + 2)[1:-1]
-        _draw(panel, plain_colour(material.use(name)), places, [one for _, one in own])
+        _draw(panel, plain_colour(data.use(name)), places, [one for _, one in own])
         for place, (result, one) in zip(places, own, strict=True):
             said = f"{name}, {result.cell.run.id}: {what} {one.mean:.2f} [{one.low:.2f}, {one.high:.2f}]"
-            panel.lead(one.mean, place, material.anchor(result), said)
+            panel.lead(one.mean, place, data.anchor(result), said)
     panel.rows(list(shown))
     panel.log("x")
     yield panel

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.limits.anchor_placement import Grid, Readings, default_step, error_map
 from benchmarks.report.figure_panel import Panel, peaks
-from benchmarks.report.report_data import Material, Series, radio_of
+from benchmarks.report.report_data import ReportData, Series, radio_of
 from fusion import Bounds
 from logs.run import Run
 
@@ -18,16 +18,16 @@ LEADING = 400
 """Points of a track that lead to their moment."""
 
 
-def maps(material: Material) -> Iterator[Panel]:
+def maps(data: ReportData) -> Iterator[Panel]:
     """One for each shown run that the best estimator has answered in."""
-    best = material.contestants[0]
-    for run_id in material.scored_runs:
-        series, run = material.series.get((run_id, best)), material.run(run_id)
+    best = data.estimators[0]
+    for run_id in data.scored_runs:
+        series, run = data.series.get((run_id, best)), data.run(run_id)
         if series is not None and series.answers.valid.any():
             panel = Panel(f"{run_id}: {best}", "x, m", "y, m", _height(run.world.bounds), fits=False)
             _floor(panel, run)
             _track(panel, series)
-            _lead(panel, material, series)
+            _lead(panel, data, series)
             panel.axes.set_aspect("equal")
             yield panel
 
@@ -67,9 +67,9 @@ def _track(panel: Panel, series: Series) -> None:
     panel.figure.colorbar(drawn, ax=panel.axes, label="position error, cm", location="bottom", shrink=0.8, aspect=40)
 
 
-def _lead(panel: Panel, material: Material, series: Series) -> None:
+def _lead(panel: Panel, data: ReportData, series: Series) -> None:
     valid, cell = np.flatnonzero(series.answers.valid), series.result.cell
     few = valid[peaks(series.error_m[valid], LEADING)]
-    said = f"{cell.contestant.id}, {cell.run.id}"
+    said = f"{cell.estimator.id}, {cell.run.id}"
     where = series.answers.x[few], series.answers.y[few]
-    panel.lead(*where, material.anchor(series.result), said, series.time_s[few])
+    panel.lead(*where, data.anchor(series.result), said, series.time_s[few])

@@ -18,7 +18,7 @@ from benchmarks.report.figure_panel import POINTING, Panel, group
 from benchmarks.report.innovations import innovations
 from benchmarks.report.maps import maps
 from benchmarks.report.pairs import deciding, pairs, run_by_run
-from benchmarks.report.report_data import Material
+from benchmarks.report.report_data import ReportData
 from benchmarks.report.sensitivity import advice, curves, sensitivity, sweeps
 from benchmarks.runner.results import judged, record, warnings
 from benchmarks.runner.suite import CLEAN, TUNE
@@ -37,104 +37,104 @@ ABOUT = (
 )
 
 
-def report(material: Material, *, limit: bool = False) -> str:
+def report(data: ReportData, *, limit: bool = False) -> str:
     """The page as Markdown with its figures in it; with ``limit`` also how far from the physical limit all are."""
-    suite = material.suite
-    counts = ((len(suite.runs), "run"), (len(material.contestants), "estimator"), (len(suite.faults) - 1, "fault"))
+    suite = data.suite
+    counts = ((len(suite.runs), "run"), (len(data.estimators), "estimator"), (len(suite.faults) - 1, "fault"))
     made = ", ".join(counted(*count) for count in (*counts, (suite.seeds, "seed")))
     parts = [
         f"# {suite.name}",
-        *_verdicts(material),
-        f"{made}: {counted(len(material.results), 'cell')}. {ABOUT}",
-        *_about_runs(material),
-        *_sections(material, limit=limit),
-        *_sensitivity(material),
-        *_provenance(material),
+        *_verdicts(data),
+        f"{made}: {counted(len(data.results), 'cell')}. {ABOUT}",
+        *_about_runs(data),
+        *_sections(data, limit=limit),
+        *_sensitivity(data),
+        *_provenance(data),
         "**Cells**",
-        entries(material),
+        entries(data),
     ]
     return "\n\n".join(parts) + "\n"
 
 
-def _about_runs(material: Material) -> Iterator[str]:
+def _about_runs(data: ReportData) -> Iterator[str]:
     """What is wrong with runs, and which do not count, and why."""
-    yield from (f"**Warning**: {as_code(warning)}" for warning in warnings(material.results))
-    if blind := sorted({result.cell.run.id for result in material.results if not result.cell.content.truth}):
+    yield from (f"**Warning**: {as_code(warning)}" for warning in warnings(data.results))
+    if blind := sorted({result.cell.run.id for result in data.results if not result.cell.content.truth}):
         yield f"Without ground truth, and so without an error: {', '.join(blind)}."
-    counting = {result.cell.run.id for result in judged(material.results)}
-    if material.scored_runs and (len(counting) > len(material.scored_runs) or material.suite.seeds > 1):
-        named = ", ".join(material.scored_runs)
+    counting = {result.cell.run.id for result in judged(data.results)}
+    if data.scored_runs and (len(counting) > len(data.scored_runs) or data.suite.seeds > 1):
+        named = ", ".join(data.scored_runs)
         yield f"Curves over instants, maps and mean NIS are of the first seed of the first runs that count: {named}."
-    tune = [run.id for run in material.suite.runs if run.split == TUNE]
-    if len(tune) == len(material.suite.runs):
+    tune = [run.id for run in data.suite.runs if run.split == TUNE]
+    if len(tune) == len(data.suite.runs):
         yield "**All runs are for tuning**: parameters may have been chosen on what they are scored on here."
     elif tune:
         named = ", ".join(tune)
         yield f"Only for tuning, and in no number but those of the parameters and of their own cells: {named}."
 
 
-def as_page(material: Material, *, limit: bool = False) -> bytes:
+def as_page(data: ReportData, *, limit: bool = False) -> bytes:
     """The report as one HTML file, with the numbers that make it a baseline for `fusion bench gate`; raises
     `FusionError` without matplotlib or markdown-it.
     """
     require_matplotlib()
-    clean = [result for result in material.results if result.cell.fault.id == CLEAN]
-    page = report(material, limit=limit)
-    return as_html(material.suite.name, page, SCRIPT + POINTING, record(material.suite, clean))
+    clean = [result for result in data.results if result.cell.fault.id == CLEAN]
+    page = report(data, limit=limit)
+    return as_html(data.suite.name, page, SCRIPT + POINTING, record(data.suite, clean))
 
 
-def _verdicts(material: Material) -> Iterator[str]:
+def _verdicts(data: ReportData) -> Iterator[str]:
     """The best against every other, in sentences."""
-    if material.comparison is None:
+    if data.comparison is None:
         yield "Nothing can be compared here: give at least two estimators, and runs with truth."
         return
-    best = material.contestants[0]
+    best = data.estimators[0]
     told = [
-        f"{verdict.sentence} ([where](#{material.anchor(deciding(material, verdict))}))"
-        for verdict in material.comparison.verdicts
+        f"{verdict.sentence} ([where](#{data.anchor(deciding(data, verdict))}))"
+        for verdict in data.comparison.verdicts
         if best in (verdict.first, verdict.second)
     ]
-    yield "\n".join(f"- {sentence}" for sentence in told + _within_the_run(material))
+    yield "\n".join(f"- {sentence}" for sentence in told + _within_the_run(data))
 
 
-def _within_the_run(material: Material) -> list[str]:
+def _within_the_run(data: ReportData) -> list[str]:
     """Where one run is all there is: what it says of itself, of the best against every other."""
-    if len(material.scored_runs) != 1:
+    if len(data.scored_runs) != 1:
         return []
-    errors = {name: series.error_m for (_, name), series in material.series.items()}
-    best, *others = (name for name in material.contestants if name in errors)
+    errors = {name: series.error_m for (_, name), series in data.series.items()}
+    best, *others = (name for name in data.estimators if name in errors)
     if len(errors[best]) < LEAST_INSTANTS:
         return []
     return [within_run(best, other, errors, *WITHIN_RUN).sentence for other in others]
 
 
-def _sections(material: Material, *, limit: bool) -> Iterator[str]:
+def _sections(data: ReportData, *, limit: bool) -> Iterator[str]:
     """Who is better, how honest all are, where and when they err, what it costs, and what breaks them."""
-    yield _table(tables.leaderboard(material), "leaderboard")
-    if material.comparison is not None:
-        yield _table(pairs(material, material.comparison), "pairs")
-    yield from _figure(material, "accuracy")
-    if material.comparison is not None:
-        yield as_markdown(run_by_run(material))
-    yield from _figure(material, "consistency")
-    yield from _known(innovations(material), "innovations")
-    yield from _figure(material, "over_time")
-    yield from _figure(material, "maps")
-    yield from _known(tables.moments(material))
-    yield from _known(tables.lost(material))
-    yield from _figure(material, "cost")
-    if limit and material.scored_runs:
-        yield as_markdown(tables.limits(material))
-        yield as_markdown(tables.fixes(material))
-    if len(material.suite.faults) > 1:
-        yield from _under_faults(material)
+    yield _table(tables.leaderboard(data), "leaderboard")
+    if data.comparison is not None:
+        yield _table(pairs(data, data.comparison), "pairs")
+    yield from _figure(data, "accuracy")
+    if data.comparison is not None:
+        yield as_markdown(run_by_run(data))
+    yield from _figure(data, "consistency")
+    yield from _known(innovations(data), "innovations")
+    yield from _figure(data, "over_time")
+    yield from _figure(data, "maps")
+    yield from _known(tables.moments(data))
+    yield from _known(tables.lost(data))
+    yield from _figure(data, "cost")
+    if limit and data.scored_runs:
+        yield as_markdown(tables.limits(data))
+        yield as_markdown(tables.fixes(data))
+    if len(data.suite.faults) > 1:
+        yield from _under_faults(data)
 
 
-def _under_faults(material: Material) -> Iterator[str]:
-    yield _table(tables.faults(material), "faults")
-    yield from _known(tables.outages(material), "outages")
-    if material.suite.seeds >= LEAST_SEEDS and material.scored_runs:
-        yield _table(tables.credibility(material), "credibility")
+def _under_faults(data: ReportData) -> Iterator[str]:
+    yield _table(tables.faults(data), "faults")
+    yield from _known(tables.outages(data), "outages")
+    if data.suite.seeds >= LEAST_SEEDS and data.scored_runs:
+        yield _table(tables.credibility(data), "credibility")
 
 
 def _table(sheet: Sheet, name: str = "") -> str:
@@ -148,28 +148,28 @@ def _known(sheet: Sheet, name: str = "") -> Iterator[str]:
         yield _table(sheet, name)
 
 
-def _figure(material: Material, name: str) -> Iterator[str]:
+def _figure(data: ReportData, name: str) -> Iterator[str]:
     """Its panels, where there is anything to draw."""
-    if material.has_errors and (panels := list(FIGURES[name](material))):
+    if data.has_errors and (panels := list(FIGURES[name](data))):
         yield f"{group(panels)}\n\n{NOTES[name]}"
 
 
-def _sensitivity(material: Material) -> Iterator[str]:
+def _sensitivity(data: ReportData) -> Iterator[str]:
     """Nothing without a grid, or where nothing was scored."""
-    found = sweeps(material) if material.has_errors else []
+    found = sweeps(data) if data.has_errors else []
     if found:
-        yield as_markdown(sensitivity(material, found))
+        yield as_markdown(sensitivity(data, found))
         yield "\n".join(f"- {sentence}" for sentence in advice(found))
-        yield f"{group(curves(material, found))}\n\n{NOTES['parameters']}"
+        yield f"{group(curves(data, found))}\n\n{NOTES['parameters']}"
 
 
-def _provenance(material: Material) -> Iterator[str]:
-    command = shlex.join(["fusion", "bench", "run", *material.words])
-    yield as_markdown(tables.provenance(material))
-    yield as_markdown(tables.contestants(material))
-    if material.suite.left_out:
-        yield f"Left out: {'; '.join(material.suite.left_out)}."
-    yield from _known(tables.damage(material))
+def _provenance(data: ReportData) -> Iterator[str]:
+    command = shlex.join(["fusion", "bench", "run", *data.words])
+    yield as_markdown(tables.provenance(data))
+    yield as_markdown(tables.estimators(data))
+    if data.suite.left_out:
+        yield f"Left out: {'; '.join(data.suite.left_out)}."
+    yield from _known(tables.damage(data))
     yield (
         f"fusion {fusion.__version__}, numpy {np.__version__}, Python {platform.python_version()}. Every cell is made "
         f"again by `{command}`; `fusion bench verify` computes a sample anew and compares it to the bit."
@@ -236,7 +236,7 @@ NOTES: Mapping[str, str] = {
 }
 
 
-FIGURES: Mapping[str, Callable[[Material], Iterator[Panel]]] = {
+FIGURES: Mapping[str, Callable[[ReportData], Iterator[Panel]]] = {
     "accuracy": accuracy,
     "consistency": consistency,
     "over_time": over_time,

@@ -16,7 +16,7 @@ from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.matching import Answers, match
 from benchmarks.review.frame import Frame
 from benchmarks.runner.execute import stored_track
-from benchmarks.runner.results import Result, by_contestant, comparison, judged, median_metrics
+from benchmarks.runner.results import Result, by_estimator, comparison, judged, median_metrics
 from benchmarks.runner.run_source import open_run
 from benchmarks.runner.store import STORE, Store
 from benchmarks.runner.suite import CLEAN, Suite
@@ -63,7 +63,7 @@ def radio_of(run: Run) -> Radio:
     return "range" if any(isinstance(measurement, Ranges) for measurement in run.measurements) else "rssi"
 
 
-class Material:
+class ReportData:
     """A suite, its results, and what follows from them; everything is computed when first asked for."""
 
     def __init__(self, suite: Suite, results: Sequence[Result], store: Store, metric: str = RANKED_BY) -> None:
@@ -82,13 +82,13 @@ class Material:
         """What links to the entry of a cell name."""
         return self._anchors[_ids(result)]
 
-    def use(self, contestant: str) -> str:
+    def use(self, estimator: str) -> str:
         """The installed name of its estimator, which has the colour."""
-        return next(one.use for one in self.suite.contestants if one.id == contestant)
+        return next(one.use for one in self.suite.estimators if one.id == estimator)
 
-    def anchor_of_all(self, contestant: str) -> str:
-        """What links to all cells of a contestant name."""
-        return f"all-{self.contestants.index(contestant)}"
+    def anchor_of_all(self, estimator: str) -> str:
+        """What links to all cells of an estimator name."""
+        return f"all-{self.estimators.index(estimator)}"
 
     @cached_property
     def _anchors(self) -> dict[tuple[str, str, str, int], str]:
@@ -109,15 +109,15 @@ class Material:
         return f"{self.unit.number(value)} {self.unit.name}".rstrip()
 
     @cached_property
-    def contestants(self) -> list[str]:
+    def estimators(self) -> list[str]:
         """The best first."""
-        grouped = by_contestant(self.results)
+        grouped = by_estimator(self.results)
         return sorted(grouped, key=lambda name: (median_metrics(grouped[name]).get(self.metric, np.inf), name))
 
     @cached_property
     def comparison(self) -> Comparison | None:
         """All pairs; None where nothing can be compared, such as runs without truth."""
-        if len(self.contestants) < 2 or not self.scored_runs:
+        if len(self.estimators) < 2 or not self.scored_runs:
             return None
         try:
             return comparison(self.results, self.metric)
@@ -126,7 +126,7 @@ class Material:
 
     @cached_property
     def timing(self) -> dict[str, float]:
-        """µs per measurement by contestant, empty when it was never measured."""
+        """µs per measurement by estimator, empty when it was never measured."""
         return read_timing(self._store.folder)
 
     @cached_property
@@ -142,17 +142,17 @@ class Material:
 
     @cached_property
     def series(self) -> dict[tuple[str, str], Series]:
-        """Clean cells of the first seed, by run and contestant, of the runs that are shown."""
+        """Clean cells of the first seed, by run and estimator, of the runs that are shown."""
         found = {}
         for result in self.results:
             cell = result.cell
             if cell.fault.id == CLEAN and cell.seed == 0 and cell.run.id in self.scored_runs:
-                found[cell.run.id, cell.contestant.id] = self._series(result)
+                found[cell.run.id, cell.estimator.id] = self._series(result)
         return found
 
-    def seeds(self, contestant: str, fault: str) -> list[list[Errors]]:
+    def seeds(self, estimator: str, fault: str) -> list[list[Errors]]:
         """Of each shown run the errors of its seeds under one fault; a crashed one answered nothing."""
-        own = by_contestant(self.results, fault).get(contestant, [])
+        own = by_estimator(self.results, fault).get(estimator, [])
         of_runs = [[result for result in own if result.cell.run.id == run_id] for run_id in self.scored_runs]
         series = [[self._series(result) for result in results] for results in of_runs]
         return [[errors(one.instants, one.answers) for one in seeds] for seeds in series]
@@ -185,4 +185,4 @@ class Material:
 
 def _ids(result: Result) -> tuple[str, str, str, int]:
     cell = result.cell
-    return cell.run.id, cell.contestant.id, cell.fault.id, cell.seed
+    return cell.run.id, cell.estimator.id, cell.fault.id, cell.seed

@@ -16,9 +16,9 @@ import fusion
 from benchmarks.metrics.score import quantile
 from benchmarks.report.cell_links import link, nearest
 from benchmarks.report.figure_panel import Panel
-from benchmarks.report.report_data import Material
+from benchmarks.report.report_data import ReportData
 from benchmarks.runner.results import Result, by_run, score_matrix
-from benchmarks.runner.suite import CLEAN, TEST, TUNE, Contestant
+from benchmarks.runner.suite import CLEAN, TEST, TUNE, EstimatorSpec
 from benchmarks.statistics.paired_tests import log_ratios, mean_interval
 from fusion.arrays import Flags, Floats
 from fusion.output.figures import plain_colour, plain_ticks
@@ -74,14 +74,14 @@ class Sweep(NamedTuple):
         return f"{self.values[place]}{' (default)' if self.has_default and place == self.compared_with else ''}"
 
 
-def sweeps(material: Material) -> list[Sweep]:
+def sweeps(data: ReportData) -> list[Sweep]:
     """Every parameter that has several values; empty for a suite without a grid."""
-    families: dict[tuple[str, str], list[Contestant]] = {}
-    for one in material.suite.contestants:
+    families: dict[tuple[str, str], list[EstimatorSpec]] = {}
+    for one in data.suite.estimators:
         if one.grid:
             families.setdefault((one.id.partition("[")[0], one.use), []).append(one)
     return [
-        _sweep(material, estimator, own, parameter, values)
+        _sweep(data, estimator, own, parameter, values)
         for (estimator, _), own in families.items()
         for parameter, values in own[0].grid.items()
         if len(values) > 1
@@ -89,10 +89,10 @@ def sweeps(material: Material) -> list[Sweep]:
 
 
 def _sweep(
-    material: Material, estimator: str, own: Sequence[Contestant], parameter: str, values: Sequence[object]
+    data: ReportData, estimator: str, own: Sequence[EstimatorSpec], parameter: str, values: Sequence[object]
 ) -> Sweep:
-    cells = [_cells(material, [one.id for one in own if one.params[parameter] == value]) for value in values]
-    scores = [[quantile(score_matrix(few, material.metric).ravel(), 0.5) for few in row] for row in cells]
+    cells = [_cells(data, [one.id for one in own if one.params[parameter] == value]) for value in values]
+    scores = [[quantile(score_matrix(few, data.metric).ravel(), 0.5) for few in row] for row in cells]
     default = parameters(fusion.load(own[0].use))[parameter].default
     known = [place for place, value in enumerate(values) if value == default]
     is_test = np.array([few[0].cell.run.split == TEST for few in cells[0]])
@@ -100,13 +100,13 @@ def _sweep(
     return Sweep(estimator, own[0].use, parameter, values, place, has_default, cells, np.array(scores), is_test)
 
 
-def _cells(material: Material, ids: Sequence[str]) -> list[list[Result]]:
-    """Run by run the cells without faults of these contestants."""
-    own = [one for one in material.results if one.cell.fault.id == CLEAN and one.cell.contestant.id in ids]
+def _cells(data: ReportData, ids: Sequence[str]) -> list[list[Result]]:
+    """Run by run the cells without faults of these estimators."""
+    own = [one for one in data.results if one.cell.fault.id == CLEAN and one.cell.estimator.id in ids]
     return list(by_run(own).values())
 
 
-def sensitivity(material: Material, found: Sequence[Sweep]) -> Sheet:
+def sensitivity(data: ReportData, found: Sequence[Sweep]) -> Sheet:
     """Each value as a multiple of what it is compared with: geometric mean over runs with its paired t interval. It
     leads to the run in which the value makes the greatest difference.
     """
@@ -115,20 +115,20 @@ def sensitivity(material: Material, found: Sequence[Sweep]) -> Sheet:
             sweep.estimator,
             sweep.parameter,
             sweep.name(place),
-            *(_linked(material, sweep, place, of) for of in (~sweep.is_test, sweep.is_test)),
+            *(_linked(data, sweep, place, of) for of in (~sweep.is_test, sweep.is_test)),
         )
         for sweep in found
         for place in range(len(sweep.values))
     ]
-    title = f"Parameters: {material.metric} as a multiple of the default's (else of the first value's), [95 %]"
+    title = f"Parameters: {data.metric} as a multiple of the default's (else of the first value's), [95 %]"
     return Sheet(title, ("estimator", "parameter", "value", "tune runs", "test runs"), tuple(rows))
 
 
-def _linked(material: Material, sweep: Sweep, place: int, of: Flags) -> str:
+def _linked(data: ReportData, sweep: Sweep, place: int, of: Flags) -> str:
     text = _told(sweep, place, of)
     if text == "–":
         return text
-    return link(material, text, _cell(material, sweep, place, _farthest(sweep, place, of)))
+    return link(data, text, _cell(data, sweep, place, _farthest(sweep, place, of)))
 
 
 def _told(sweep: Sweep, place: int, of: Flags) -> str:
@@ -157,13 +157,13 @@ def advice(found: Sequence[Sweep]) -> Iterator[str]:
             yield f"{chosen}; on the {TEST} runs it scores {worth} what {sweep.name(sweep.compared_with)} does."
 
 
-def curves(material: Material, found: Sequence[Sweep]) -> Iterator[Panel]:
+def curves(data: ReportData, found: Sequence[Sweep]) -> Iterator[Panel]:
     """One panel per parameter."""
     for sweep in found:
-        title, y = f"{sweep.estimator}: {sweep.parameter}", f"ratio of {material.metric}, log scale"
+        title, y = f"{sweep.estimator}: {sweep.parameter}", f"ratio of {data.metric}, log scale"
         panel = Panel(title, "value; dotted: the default" if sweep.has_default else "value", y)
         _draw(panel, sweep)
-        _lead(panel, material, sweep)
+        _lead(panel, data, sweep)
         yield panel
 
 
@@ -186,16 +186,16 @@ def _draw(panel: Panel, sweep: Sweep) -> None:
     axes.set_xticks(places, [str(value) for value in sweep.values])
 
 
-def _lead(panel: Panel, material: Material, sweep: Sweep) -> None:
+def _lead(panel: Panel, data: ReportData, sweep: Sweep) -> None:
     """Runs to their own cells, means to the run in which the value makes the greatest difference."""
     for place in range(len(sweep.values)):
         value = f"{sweep.estimator}, {sweep.parameter} = {sweep.name(place)}"
         for run, ratio in enumerate(sweep.ratios[place]):
-            cell = _cell(material, sweep, place, run)
-            panel.lead(place, ratio, material.anchor(cell), f"{value}, {cell.cell.run.id}: {ratio:.2f}×")
-        cell = _cell(material, sweep, place, _farthest(sweep, place, sweep.judged))
+            cell = _cell(data, sweep, place, run)
+            panel.lead(place, ratio, data.anchor(cell), f"{value}, {cell.cell.run.id}: {ratio:.2f}×")
+        cell = _cell(data, sweep, place, _farthest(sweep, place, sweep.judged))
         said = f"{value}: {_told(sweep, place, sweep.judged)}, farthest in {cell.cell.run.id}"
-        panel.lead(place, sweep.intervals[0][place], material.anchor(cell), said)
+        panel.lead(place, sweep.intervals[0][place], data.anchor(cell), said)
 
 
 def _farthest(sweep: Sweep, place: int, of: Flags) -> int:
@@ -203,5 +203,5 @@ def _farthest(sweep: Sweep, place: int, of: Flags) -> int:
     return int(np.where(of, np.abs(sweep.log_ratios[place]), -1.0).argmax())
 
 
-def _cell(material: Material, sweep: Sweep, place: int, run: int) -> Result:
-    return nearest(sweep.cells[place][run], material.metric, sweep.scores[place, run])
+def _cell(data: ReportData, sweep: Sweep, place: int, run: int) -> Result:
+    return nearest(sweep.cells[place][run], data.metric, sweep.scores[place, run])

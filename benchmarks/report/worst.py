@@ -18,12 +18,12 @@ def command(result: Result, suite: Sequence[str]) -> str:
     on a command line.
     """
     cell = result.cell
-    log = re.sub(r"[^\w.=-]+", "-", f"{cell.run.id}.{cell.contestant.id}.{cell.fault.id}.{cell.seed}") + ".mcap"
-    words = ["fusion", "bench", "replay", *suite, cell.run.id, cell.contestant.id]
+    log = re.sub(r"[^\w.=-]+", "-", f"{cell.run.id}.{cell.estimator.id}.{cell.fault.id}.{cell.seed}") + ".mcap"
+    words = ["fusion", "bench", "replay", *suite, cell.run.id, cell.estimator.id]
     words += [] if cell.fault.id == CLEAN else ["--fault", cell.fault.id]
     words += ["--seed", str(cell.seed)] if cell.seed else []
     made = shlex.join([*words, "-o", log])
-    use, params = cell.contestant.use, cell.contestant.params
+    use, params = cell.estimator.use, cell.estimator.params
     return f"{made} && {review_command([log], use, result.worst_at_s, params=params, seed=cell.seed)}"
 
 
@@ -32,5 +32,5 @@ def worst_moments(results: Sequence[Result], count: int = 10) -> list[Result]:
     clean = [one for one in judged(results) if one.cell.fault.id == CLEAN and one.worst_at_s is not None]
     found: dict[tuple[str, str], Result] = {}
     for one in sorted(clean, key=lambda one: -one.metrics.get("pos_max", np.nan)):
-        found.setdefault((one.cell.run.id, one.cell.contestant.id), one)
+        found.setdefault((one.cell.run.id, one.cell.estimator.id), one)
     return list(found.values())[:count]

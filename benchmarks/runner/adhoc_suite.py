@@ -10,7 +10,7 @@ from typing import Any
 import fusion
 from benchmarks.cell import STATUSES, Cell, Score, cached_run, crashed, score_cell
 from benchmarks.metrics.score import pool
-from benchmarks.runner.workers import Loss, compute
+from benchmarks.runner.workers import TaskFailure, compute
 from fusion import LogError
 from fusion.cli.options import Settings, require_estimators, require_settings
 from fusion.output.files import write_json
@@ -48,7 +48,7 @@ def bench(
     return [scores[index] for index in sorted(scores)]
 
 
-def _lost(cell: Cell, _: Loss) -> Score:
+def _lost(cell: Cell, _: TaskFailure) -> Score:
     return crashed(cell, LOST)
 
 

@@ -15,7 +15,7 @@ from distributed import Reschedule, Worker, WorkerPlugin, get_worker
 
 from benchmarks.runner.execute import carry_out, give_up
 from benchmarks.runner.plan import Cell
-from benchmarks.runner.workers import Crew, Limits
+from benchmarks.runner.workers import Limits, WorkerPool
 
 Task = tuple[Cell, Path]
 IDLE_S = 60.0
@@ -33,23 +33,23 @@ class CellProcesses(WorkerPlugin):
         # The workers of a Dask nanny are daemons, which the standard library lets have no children, lest they be left
         # behind. Ours end with their parent.
         current_process().daemon = False
-        self._crews = [Crew(carry_out, give_up, self._limits, IDLE_S) for _ in range(worker.state.nthreads)]
-        self._free: LifoQueue[Crew[Task, str]] = LifoQueue()
-        for crew in self._crews:
-            self._free.put(crew)
+        self._pools = [WorkerPool(carry_out, give_up, self._limits, IDLE_S) for _ in range(worker.state.nthreads)]
+        self._free: LifoQueue[WorkerPool[Task, str]] = LifoQueue()
+        for pool in self._pools:
+            self._free.put(pool)
 
     def teardown(self, worker: Worker) -> None:  # noqa: ARG002 - Dask's signature
         """End the processes, in the middle of a cell if need be."""
-        for crew in self._crews:
-            crew.dismiss()
+        for pool in self._pools:
+            pool.dismiss()
 
     def carry_out(self, task: Task) -> str:
         """Make what is missing of one cell within the limits; answers its status. Raises `CancelledError`."""
-        crew = self._free.get()
+        pool = self._free.get()
         try:
-            ((_, status),) = crew.compute([task], workers=1)
+            ((_, status),) = pool.compute([task], workers=1)
         finally:
-            self._free.put(crew)
+            self._free.put(pool)
         return status
 
 

@@ -23,16 +23,16 @@ from benchmarks.runner.reference import reference_of
 from benchmarks.runner.run_source import open_run
 from benchmarks.runner.store import Store, to_json
 from benchmarks.runner.suite import CLEAN
-from benchmarks.runner.workers import Limits, Loss, compute
+from benchmarks.runner.workers import Limits, TaskFailure, compute
 from logs.run import Run
 
 LOST = {
-    Loss.CRASHED: "its process died, twice; `fusion bench replay` runs it alone, to see why",
-    Loss.TIMEOUT: "it took longer than limits.wall_s of the suite",
-    Loss.OUT_OF_MEMORY: "it took more memory than limits.rss_mb of the suite",
+    TaskFailure.CRASHED: "its process died, twice; `fusion bench replay` runs it alone, to see why",
+    TaskFailure.TIMEOUT: "it took longer than limits.wall_s of the suite",
+    TaskFailure.OUT_OF_MEMORY: "it took more memory than limits.rss_mb of the suite",
 }
 
-BROKEN = {Loss.TIMEOUT.value: "wall_s", Loss.OUT_OF_MEMORY.value: "rss_mb"}
+BROKEN = {TaskFailure.TIMEOUT.value: "wall_s", TaskFailure.OUT_OF_MEMORY.value: "rss_mb"}
 """The limit behind each loss that a greater one may spare."""
 
 
@@ -64,13 +64,13 @@ def carry_out(task: tuple[Cell, Path]) -> str:
     return score(cell, store)
 
 
-def give_up(task: tuple[Cell, Path], loss: Loss) -> str:
+def give_up(task: tuple[Cell, Path], loss: TaskFailure) -> str:
     """Keep what became of a cell whose process did not survive it: a failure is a result too."""
     cell, folder = task
     store = Store(folder)
     if not has_estimate(cell, store):
         _forget(cell, store)
-    keep(cell, store, EstimatorRun(cell.contestant.use, (), "", 0.0, LOST[loss]), None, ended=loss.value)
+    keep(cell, store, EstimatorRun(cell.estimator.use, (), "", 0.0, LOST[loss]), None, ended=loss.value)
     return score(cell, store)
 
 
@@ -81,8 +81,8 @@ def _forget(cell: Cell, store: Store) -> None:
 
 
 def fold(cell: Cell, run: Run) -> EstimatorRun:
-    """What the contestant of a cell makes of its run, faults and all."""
-    return run_estimator(run, cell.contestant.use, cell.contestant.params, cell.seed)
+    """What the estimator of a cell makes of its run, faults and all."""
+    return run_estimator(run, cell.estimator.use, cell.estimator.params, cell.seed)
 
 
 def faulty_run(cell: Cell) -> Run:
@@ -123,7 +123,7 @@ def _broken_limit(cell: Cell, ended: str) -> dict[str, object]:
 
 
 def stored_track(cell: Cell, store: Store) -> tuple[Track, FateColumns]:
-    """What the contestant said and what became of its readings; raises `FusionError` when that is damaged."""
+    """What the estimator said and what became of its readings; raises `FusionError` when that is damaged."""
     place = ("estimates", cell.estimate_key, "track.npz")
     try:
         return from_bytes(store.read(*place))

@@ -56,7 +56,7 @@ def as_junit(suite: Suite, results: Sequence[Result]) -> bytes:
     for result in results:
         cell = result.cell
         case = ElementTree.SubElement(
-            root, "testcase", classname=f"{cell.run.id}.{cell.fault.id}", name=f"{cell.contestant.id}[{cell.seed}]"
+            root, "testcase", classname=f"{cell.run.id}.{cell.fault.id}", name=f"{cell.estimator.id}[{cell.seed}]"
         )
         if result.status not in ALIVE:
             ElementTree.SubElement(case, "failure", message=result.status).text = _printable(

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.cell import ALIVE
 from benchmarks.metrics.score import METRICS_VERSION
-from benchmarks.runner.results import Result, by_contestant, score_matrix
+from benchmarks.runner.results import Result, by_estimator, score_matrix
 from benchmarks.runner.suite import CLEAN, TEST, Gate
 from benchmarks.statistics.verdict import compare
 from fusion import SuiteError
@@ -53,7 +53,7 @@ class Finding(NamedTuple):
 def judge(results: Sequence[Result], gate: Gate, baseline: Baseline | None) -> list[Finding]:
     """Every condition of ``gate`` on results without faults."""
     findings = []
-    for name, own in by_contestant(results, CLEAN).items():
+    for name, own in by_estimator(results, CLEAN).items():
         for metric, least in gate.floor.items():
             findings.append(_floor(name, own, metric, least))
         findings += [_inside(name, own, metric) for metric in gate.inside]
@@ -132,13 +132,13 @@ def _ratio(name: str, metric: str, margin: float, now: Floats, before: Floats) -
 
 Row = Mapping[str, Any]
 Baseline = Mapping[str, Sequence[Row]]
-"""Rows of an earlier record, by contestant."""
+"""Rows of an earlier record, by estimator."""
 Place = tuple[str, int]
 """The run and the seed of a cell."""
 
 
 def read_baseline(path: Path) -> Baseline:
-    """What `fusion bench export --json`, or `report --html`, has written, by contestant; raises `SuiteError`."""
+    """What `fusion bench export --json`, or `report --html`, has written, by estimator; raises `SuiteError`."""
     try:
         text = path.read_text(encoding="utf-8")
         stored = data_of(text) if path.suffix == ".html" else json.loads(text)

@@ -12,7 +12,7 @@ from rich.table import Table
 from benchmarks.cell import ALIVE, STATUSES, Score
 from benchmarks.metrics.catalogue import COLUMNS, RANKED_BY, Column, as_text
 from benchmarks.metrics.innovations import NAMES
-from benchmarks.runner.results import Result, by_contestant, median_metrics
+from benchmarks.runner.results import Result, by_estimator, median_metrics
 from benchmarks.runner.suite import CLEAN
 from benchmarks.statistics.verdict import Comparison, Verdict
 from fusion.output.tables import Sheet, console
@@ -89,10 +89,10 @@ def _table(
 
 
 def leaderboard(results: Sequence[Result], fault: str = CLEAN) -> Sheet:
-    """The contestants, the best first: by how many cells were lost, then by the median of the ranking metric."""
+    """The estimators, the best first: by how many cells were lost, then by the median of the ranking metric."""
     shown = [column for column in COLUMNS if column.key != "cpu_per_measurement_s"]
     rows = []
-    for name, own in by_contestant(results, fault).items():
+    for name, own in by_estimator(results, fault).items():
         lost, medians = sum(result.status not in ALIVE for result in own), median_metrics(own)
         numbers = (as_text(column, medians) for column in shown)
         rows.append(((lost, medians.get(RANKED_BY, math.inf), name), (name, f"{len(own) - lost}/{len(own)}", *numbers)))

@@ -18,17 +18,17 @@ from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.runner.archive import ARCHIVE_VERSION
 from benchmarks.runner.run_source import Content, content_of, fingerprint
 from benchmarks.runner.store import Store, key_of
-from benchmarks.runner.suite import CLEAN, CellLimits, Contestant, Evaluation, FaultSet, RunSource, Suite
+from benchmarks.runner.suite import CLEAN, CellLimits, EstimatorSpec, Evaluation, FaultSet, RunSource, Suite
 from fusion import SuiteError
 from fusion.errors import did_you_mean
 from fusion.plugins import parameters
 
 
 class Cell(NamedTuple):
-    """One run, one contestant, one set of faults, one seed: a pure function of what its spec says, and its keys."""
+    """One run, one estimator, one set of faults, one seed: a pure function of what its spec says, and its keys."""
 
     run: RunSource
-    contestant: Contestant
+    estimator: EstimatorSpec
     fault: FaultSet
     seed: int
     suite_seed: int
@@ -40,12 +40,12 @@ class Cell(NamedTuple):
     score_key: str
 
     def __str__(self) -> str:
-        return f"{self.run.id} {self.contestant.id} {self.fault.id} {self.seed}"
+        return f"{self.run.id} {self.estimator.id} {self.fault.id} {self.seed}"
 
 
 def cells_of(suite: Suite, store: Store) -> list[Cell]:
     """Every cell, run by run, so that each run is opened few times; raises before any work what can be refused."""
-    made = {contestant.id: contestant_spec(contestant) for contestant in suite.contestants}
+    made = {estimator.id: estimator_identity(estimator) for estimator in suite.estimators}
     for fault in suite.faults:
         read_faults(fault)
     folder, rules = suite.folder, asdict(suite.evaluation)
@@ -53,33 +53,33 @@ def cells_of(suite: Suite, store: Store) -> list[Cell]:
     for run in suite.runs:
         content = content_of(run, folder, store)
         judged = {"truth": content.truth, "evaluation": rules, "metrics": METRICS_VERSION}
-        for fault, contestant, seed in product(suite.faults, suite.contestants, range(suite.seeds)):
-            spec = {**made[contestant.id], **run_spec(suite, run, fault, content), "seed": seed}
+        for fault, estimator, seed in product(suite.faults, suite.estimators, range(suite.seeds)):
+            spec = {**made[estimator.id], **run_identity(suite, run, fault, content), "seed": seed}
             key = key_of(spec)
-            drawn = (run, contestant, fault, seed, suite.seed, suite.evaluation, suite.limits, folder, content)
+            drawn = (run, estimator, fault, seed, suite.seed, suite.evaluation, suite.limits, folder, content)
             cells.append(Cell(*drawn, key, key_of({"estimate": key, **judged})))
     return cells
 
 
-def contestant_spec(contestant: Contestant) -> dict[str, object]:
+def estimator_identity(estimator: EstimatorSpec) -> dict[str, object]:
     """What an estimate depends on beside the run: code, parameters (those not given at their defaults), numerics."""
-    made = fusion.load(contestant.use)
+    made = fusion.load(estimator.use)
     known = {name: parameter.default for name, parameter in parameters(made).items()}
-    for key in contestant.params:
+    for key in estimator.params:
         if key not in known:
             hint = did_you_mean(key, known)
-            raise SuiteError(f"estimator {contestant.id}: {contestant.use} has no parameter {key!r}; {hint}")
+            raise SuiteError(f"estimator {estimator.id}: {estimator.use} has no parameter {key!r}; {hint}")
     return {
         "estimator": f"{made.__module__}:{made.__qualname__}",
         "code": fingerprint(made.__module__),
-        "parameters": {**known, **contestant.params},
+        "parameters": {**known, **estimator.params},
         "numpy": np.__version__,
         "python": platform.python_version(),
         "archive": ARCHIVE_VERSION,
     }
 
 
-def run_spec(suite: Suite, run: RunSource, fault: FaultSet, content: Content) -> dict[str, object]:
+def run_identity(suite: Suite, run: RunSource, fault: FaultSet, content: Content) -> dict[str, object]:
     """What an estimate depends on of the run. Faults are drawn by suite seed and run, never by estimator."""
     if fault.id == CLEAN:
         return {"measured": content.measured}

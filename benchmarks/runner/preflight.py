@@ -9,7 +9,7 @@ import fusion
 from benchmarks.faults.inject import struck
 from benchmarks.runner.plan import Cell, read_faults
 from benchmarks.runner.run_source import open_run, open_world
-from benchmarks.runner.suite import CLEAN, Contestant
+from benchmarks.runner.suite import CLEAN, EstimatorSpec
 from fusion import FusionError, ParameterError, SuiteError, World
 
 
@@ -22,11 +22,11 @@ def refuse_impossible(cells: Sequence[Cell]) -> None:
 
 
 def _refuse_parameters(cells: Sequence[Cell]) -> None:
-    """Build every contestant once in each world it is to run in."""
+    """Build every estimator once in each world it is to run in."""
     one_each = {cell.run.id: cell for cell in cells}
     worlds = {run: open_world(cell.run, cell.folder) for run, cell in one_each.items()}
-    asked = {(cell.contestant.id, worlds[cell.run.id].hash): cell for cell in cells}.values()
-    told = {cell.contestant.id: _refusal(cell.contestant, worlds[cell.run.id]) for cell in asked}
+    asked = {(cell.estimator.id, worlds[cell.run.id].hash): cell for cell in cells}.values()
+    told = {cell.estimator.id: _refusal(cell.estimator, worlds[cell.run.id]) for cell in asked}
     refused = {name: why for name, why in told.items() if why is not None}
     if refused:
         first, *others = refused
@@ -34,16 +34,16 @@ def _refuse_parameters(cells: Sequence[Cell]) -> None:
         raise SuiteError(f"estimator {first}: {refused[first]}{more}")
 
 
-def _refusal(contestant: Contestant, world: World) -> str | None:
+def _refusal(estimator: EstimatorSpec, world: World) -> str | None:
     """Why the parameters are refused, None when they are not. An estimator that cannot be had in that world whatever
     its parameters is not refused: that is a result, of cells that are lost.
     """
     try:
-        fusion.build(contestant.use, world, contestant.params)
+        fusion.build(estimator.use, world, estimator.params)
     except ParameterError as error:
         return str(error)
     except FusionError as error:
-        return str(error) if contestant.params and _can_be_built(contestant.use, world) else None
+        return str(error) if estimator.params and _can_be_built(estimator.use, world) else None
     return None
 
 

@@ -63,11 +63,11 @@ Item = TypeVar("Item")
 
 def one_cell(suite: Suite, store: Store, run: str, estimator: str, *, fault: str = CLEAN, seed: int = 0) -> Cell:
     """The cell of a suite by the ids of what it is made of; raises `SuiteError` that names the nearest."""
-    contestants = _found("estimator", estimator, {one.id: one for one in suite.contestants})
+    estimators = _found("estimator", estimator, {one.id: one for one in suite.estimators})
     faults = _found("fault", fault, {one.id: one for one in suite.faults})
     if not 0 <= seed < suite.seeds:
         raise SuiteError(f"{suite.name}: there is no seed {seed}; its seeds are 0 to {suite.seeds - 1}")
-    return cells_of(replace(suite, runs=(suite.run(run),), contestants=contestants, faults=faults), store)[seed]
+    return cells_of(replace(suite, runs=(suite.run(run),), estimators=estimators, faults=faults), store)[seed]
 
 
 def _found(what: str, wanted: str, known: Mapping[str, Item]) -> tuple[Item]:
@@ -77,17 +77,17 @@ def _found(what: str, wanted: str, known: Mapping[str, Item]) -> tuple[Item]:
 
 
 def replay_cell(cell: Cell, output: Path) -> str:
-    """Fold the run of ``cell``, faults and all, through its contestant; write what was measured and said as a log, and
-    answer the digest: "" where the contestant crashed, which the log then shows up to that moment.
+    """Fold the run of ``cell``, faults and all, through its estimator; write what was measured and said as a log, and
+    answer the digest: "" where the estimator crashed, which the log then shows up to that moment.
     """
     run = faulty_run(cell)
     estimator_run = fold(cell, run)
     about = {
-        "estimator": cell.contestant.use,
+        "estimator": cell.estimator.use,
         "seed": str(cell.seed),
         "fault": cell.fault.id,
         "digest": estimator_run.digest,
     }
-    parameters = json.dumps(dict(cell.contestant.params), sort_keys=True)
+    parameters = json.dumps(dict(cell.estimator.params), sort_keys=True)
     write_replay(run, estimator_run, output, {**run.metadata, **about, "parameters": parameters})
     return estimator_run.digest

@@ -70,12 +70,12 @@ def judged(results: Sequence[Result]) -> list[Result]:
     return [result for result in test if result.cell.content.truth] or test
 
 
-def by_contestant(results: Sequence[Result], fault: str = CLEAN) -> dict[str, list[Result]]:
-    """The results under one fault that count, by contestant, in the suite's order."""
+def by_estimator(results: Sequence[Result], fault: str = CLEAN) -> dict[str, list[Result]]:
+    """The results under one fault that count, by estimator, in the suite's order."""
     grouped: dict[str, list[Result]] = {}
     for result in judged(results):
         if result.cell.fault.id == fault:
-            grouped.setdefault(result.cell.contestant.id, []).append(result)
+            grouped.setdefault(result.cell.estimator.id, []).append(result)
     return grouped
 
 
@@ -97,14 +97,14 @@ def median_metrics(results: Sequence[Result]) -> dict[str, float]:
 
 
 def score_matrix(results: Sequence[Result], metric: str) -> Floats:
-    """One contestant's scores under one fault, (runs, seeds), both in the suite's order."""
+    """One estimator's scores under one fault, (runs, seeds), both in the suite's order."""
     rows = [[result.metrics.get(metric, math.inf) for result in own] for own in by_run(results).values()]
     return np.array([[math.inf if math.isnan(value) else value for value in row] for row in rows], dtype=np.float64)
 
 
 def comparison(results: Sequence[Result], metric: str = RANKED_BY, fault: str = CLEAN) -> Comparison:
-    """All pairs of contestants, the best first; raises `ParameterError` where they cannot be compared."""
-    grouped = by_contestant(results, fault)
+    """All pairs of estimators, the best first; raises `ParameterError` where they cannot be compared."""
+    grouped = by_estimator(results, fault)
     order = sorted(grouped, key=lambda name: (median_metrics(grouped[name]).get(metric, math.inf), name))
     return compare({name: score_matrix(grouped[name], metric) for name in order}, metric)
 
@@ -117,7 +117,7 @@ def record(suite: Suite, results: Sequence[Result]) -> dict[str, object]:
 def flat(result: Result) -> dict[str, object]:
     """One result as one row."""
     cell = result.cell
-    head = {"run": cell.run.id, "estimator": cell.contestant.id, "fault": cell.fault.id, "seed": cell.seed}
+    head = {"run": cell.run.id, "estimator": cell.estimator.id, "fault": cell.fault.id, "seed": cell.seed}
     tail = {"status": result.status, "error": result.error, "digest": result.digest, "split": cell.run.split}
     keys = {"estimate_key": cell.estimate_key, "score_key": cell.score_key}
     numbers = {key: value if math.isfinite(value) else None for key, value in result.metrics.items()}

@@ -37,7 +37,7 @@ def run_suite(
     todo = [*open_cells.estimates, *open_cells.scores]
     for done, one in enumerate(_carried_out(todo, suite, store, workers, dask), start=1):
         if progress is not None:
-            progress(done, len(todo), f"{one.cell.run.id} {one.cell.contestant.id}")
+            progress(done, len(todo), f"{one.cell.run.id} {one.cell.estimator.id}")
     return read_results(cells, store)
 
 

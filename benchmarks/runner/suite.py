@@ -67,8 +67,8 @@ class RunSource:
 
 
 @dataclass(frozen=True, slots=True)
-class Contestant:
-    """One estimator with one set of parameters. ``use`` is its installed name; ``grid`` makes one contestant of each
+class EstimatorSpec:
+    """One estimator with one set of parameters. ``use`` is its installed name; ``grid`` makes one estimator of each
     combination; ``tuned_on`` names the runs its parameters were chosen on; ``optional``: left out where its package is
     missing, where the suite would be refused otherwise.
     """
@@ -80,8 +80,8 @@ class Contestant:
     tuned_on: tuple[str, ...] = ()
     optional: bool = False
 
-    def combinations(self) -> list[Contestant]:
-        """One contestant per point of the grid, which it keeps: what else was tried belongs to a result."""
+    def combinations(self) -> list[EstimatorSpec]:
+        """One estimator per point of the grid, which it keeps: what else was tried belongs to a result."""
         if not self.grid:
             return [self]
         found = []
@@ -129,7 +129,7 @@ class _File:
 
     suite: _Head
     runs: tuple[RunSource, ...]
-    estimators: tuple[Contestant, ...]
+    estimators: tuple[EstimatorSpec, ...]
     faults: tuple[FaultSet, ...] = ()
     gate: Gate = Gate()
 
@@ -147,7 +147,7 @@ class Suite:
     evaluation: Evaluation
     limits: CellLimits
     runs: tuple[RunSource, ...]
-    contestants: tuple[Contestant, ...]
+    estimators: tuple[EstimatorSpec, ...]
     faults: tuple[FaultSet, ...]
     gate: Gate
     path: Path
@@ -207,12 +207,12 @@ def _checked(written: _File, path: Path) -> Suite:
     _check_parameters(written, path)
     absent = _absent(written.estimators)
     present = [one for one in written.estimators if not (one.optional and one.use in absent)]
-    contestants = tuple(each for estimator in present for each in estimator.combinations())
+    estimators = tuple(each for estimator in present for each in estimator.combinations())
     left_out = in_sentences(absent.values())
-    if absent and not contestants:
+    if absent and not estimators:
         raise SuiteError(f"{path}: estimators: none of them is installed: {'; '.join(left_out)}")
     faults = (FaultSet(CLEAN), *written.faults)
-    for what, items in (("runs", written.runs), ("estimators", contestants), ("faults", faults)):
+    for what, items in (("runs", written.runs), ("estimators", estimators), ("faults", faults)):
         _require_unique([item.id for item in items], f"{path}: {what}")
     for number, run in enumerate(written.runs):
         _check_run(run, f"{path}: runs[{number}] ({run.id})")
@@ -227,7 +227,7 @@ def _checked(written: _File, path: Path) -> Suite:
         head.eval,
         head.limits,
         runs,
-        contestants,
+        estimators,
         faults,
         written.gate,
         path.resolve(),
@@ -235,7 +235,7 @@ def _checked(written: _File, path: Path) -> Suite:
     )
 
 
-def _absent(estimators: Sequence[Contestant]) -> dict[str, NotInstalledError]:
+def _absent(estimators: Sequence[EstimatorSpec]) -> dict[str, NotInstalledError]:
     """Why the optional ones that are not there are not, by the name they use."""
     found = {}
     for name in dict.fromkeys(estimator.use for estimator in estimators if estimator.optional):
@@ -293,7 +293,7 @@ def _require_one_of(word: str, known: Sequence[str], where: str) -> None:
 
 
 def _check_parameters(written: _File, path: Path) -> None:
-    """A grid without a value would make no contestant at all, and what is no number has no place in a key."""
+    """A grid without a value would make no estimator at all, and what is no number has no place in a key."""
     for estimator in written.estimators:
         for name, values in estimator.grid.items():
             if not values:

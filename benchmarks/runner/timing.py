@@ -14,9 +14,9 @@ import numpy as np
 import fusion
 from benchmarks.runner.execute import LOST
 from benchmarks.runner.run_source import open_run
-from benchmarks.runner.suite import Contestant, RunSource, Suite
+from benchmarks.runner.suite import EstimatorSpec, RunSource, Suite
 from benchmarks.runner.worker_process import peak_rss_bytes
-from benchmarks.runner.workers import Limits, Loss, compute
+from benchmarks.runner.workers import Limits, TaskFailure, compute
 from fusion import FusionError
 from fusion.arrays import Floats
 from fusion.values import seconds
@@ -29,17 +29,17 @@ REPEATS = 5
 TIMING_FILE = "timing.json"
 
 
-TimingTask: TypeAlias = tuple[RunSource, Path, Contestant, int]
-"""A run, the folder of its suite, a contestant, and how many repeats."""
+TimingTask: TypeAlias = tuple[RunSource, Path, EstimatorSpec, int]
+"""A run, the folder of its suite, an estimator, and how many repeats."""
 
 
 class Timing(NamedTuple):
-    """What one contestant costs: processor time per measurement [µs], the least of all repeats and their quartiles;
+    """What one estimator costs: processor time per measurement [µs], the least of all repeats and their quartiles;
     quantiles of the time one measurement takes [µs], in the best repeat; how many seconds of processor time a second
     of the log takes; and the peak memory [MB] of a fresh process that opens the run and filters it once.
     """
 
-    contestant: str
+    estimator: str
     least_us: float
     low_us: float
     high_us: float
@@ -52,40 +52,40 @@ class Timing(NamedTuple):
 
 
 class Untimed(NamedTuple):
-    """A contestant that has no time, and why."""
+    """A estimator that has no time, and why."""
 
-    contestant: str
+    estimator: str
     why: str
 
 
 def measure(suite: Suite, repeats: int = REPEATS) -> Iterator[Timing | Untimed]:
-    """Every contestant on the suite's first run, after one run to warm up, in a process of its own within the suite's
+    """Every estimator on the suite's first run, after one run to warm up, in a process of its own within the suite's
     limits: one that fails, hangs or dies costs its own time alone.
     """
-    tasks = [(suite.runs[0], suite.folder, contestant, repeats) for contestant in suite.contestants]
+    tasks = [(suite.runs[0], suite.folder, estimator, repeats) for estimator in suite.estimators]
     limits = Limits(suite.limits.wall_s * (repeats + 1), suite.limits.rss_mb)
     for task in tasks:
         ((_, found),) = compute(_time, _untimed, [task], 1, limits)
         yield found
 
 
-def _untimed(task: TimingTask, loss: Loss) -> Timing | Untimed:
+def _untimed(task: TimingTask, loss: TaskFailure) -> Timing | Untimed:
     return Untimed(task[2].id, LOST[loss])
 
 
 def _time(task: TimingTask) -> Timing | Untimed:
-    source, folder, contestant, repeats = task
+    source, folder, estimator, repeats = task
     run = open_run(source, folder)
     stamps = [measurement.time_ns for measurement in run.measurements]
     if not stamps:
-        return Untimed(contestant.id, f"{source.id} holds no measurement")
+        return Untimed(estimator.id, f"{source.id} holds no measurement")
     try:
-        _fold_us(run, contestant)
+        _fold_us(run, estimator)
         rss_mb = peak_rss_bytes() / 2**20
-        folds = [_fold_us(run, contestant) for _ in range(repeats)]
+        folds = [_fold_us(run, estimator) for _ in range(repeats)]
     except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way, and has no time then
-        return Untimed(contestant.id, str(error) if isinstance(error, FusionError) else repr(error))
-    return _timing(contestant.id, folds, max(seconds(max(stamps) - min(stamps)), 1e-9), rss_mb)
+        return Untimed(estimator.id, str(error) if isinstance(error, FusionError) else repr(error))
+    return _timing(estimator.id, folds, max(seconds(max(stamps) - min(stamps)), 1e-9), rss_mb)
 
 
 def _timing(name: str, folds: Sequence[Floats], log_s: float, rss_mb: float) -> Timing:
@@ -96,9 +96,9 @@ def _timing(name: str, folds: Sequence[Floats], log_s: float, rss_mb: float) -> 
     return Timing(name, min(means), low, high, p50, p95, p99, most, 1e-6 * float(best.sum()) / log_s, rss_mb)
 
 
-def _fold_us(run: Run, contestant: Contestant) -> Floats:
+def _fold_us(run: Run, estimator: EstimatorSpec) -> Floats:
     """How long each measurement took, (n,) [µs]."""
-    built = fusion.build(contestant.use, run.world, contestant.params)
+    built = fusion.build(estimator.use, run.world, estimator.params)
     tracker = fusion.Tracker(built, run.world, starting_prior(run))
     clock = [time.process_time_ns()]
     for measurement in run.measurements:
@@ -119,8 +119,8 @@ def machine() -> dict[str, str]:
 
 
 def read_timing(folder: Path) -> dict[str, float]:
-    """The least µs per measurement by contestant, as last measured into the store; empty when it never was."""
+    """The least µs per measurement by estimator, as last measured into the store; empty when it never was."""
     path = folder / TIMING_FILE
     if not path.is_file():
         return {}
-    return {row["contestant"]: row["least_us"] for row in json.loads(path.read_text(encoding="utf-8"))["timings"]}
+    return {row["estimator"]: row["least_us"] for row in json.loads(path.read_text(encoding="utf-8"))["timings"]}

@@ -9,7 +9,7 @@ from pathlib import Path
 from benchmarks.runner.execute import execute
 from benchmarks.runner.plan import Cell
 from benchmarks.runner.store import Store
-from benchmarks.runner.workers import Limits, Loss
+from benchmarks.runner.workers import Limits, TaskFailure
 
 NOT_DETERMINISTIC, NOT_MEASURED = 5, 3
 """Exit codes."""
@@ -34,7 +34,7 @@ def _is_pure(cell: Cell, store: Store) -> bool:
     if not store.has("scores", cell.score_key):
         return False
     made = store.read_json("estimates", cell.estimate_key, "result.json")
-    return made["ended"] not in (Loss.TIMEOUT.value, Loss.OUT_OF_MEMORY.value)
+    return made["ended"] not in (TaskFailure.TIMEOUT.value, TaskFailure.OUT_OF_MEMORY.value)
 
 
 def _same(cell: Cell, store: Store, again: Store) -> bool:

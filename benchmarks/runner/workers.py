@@ -40,7 +40,7 @@ class Limits(NamedTuple):
 
 
 @unique
-class Loss(Enum):
+class TaskFailure(Enum):
     """Why a task has no result."""
 
     CRASHED = "crashed"
@@ -50,7 +50,7 @@ class Loss(Enum):
 
 def compute(
     work: Callable[[Task], Result],
-    lost: Callable[[Task, Loss], Result],
+    lost: Callable[[Task, TaskFailure], Result],
     tasks: Sequence[Task],
     workers: int,
     limits: Limits | None = None,
@@ -62,14 +62,14 @@ def compute(
     if workers <= 1 and limits is None:
         yield from ((index, work(task)) for index, task in enumerate(tasks))
         return
-    crew = Crew(work, lost, limits or Limits())
+    pool = WorkerPool(work, lost, limits or Limits())
     try:
-        yield from crew.compute(tasks, workers)
+        yield from pool.compute(tasks, workers)
     finally:
-        crew.dismiss()
+        pool.dismiss()
 
 
-class Crew(Generic[Task, Result]):
+class WorkerPool(Generic[Task, Result]):
     """The processes at work: started when they are needed, and kept for the next tasks until they are dismissed.
 
     One that has nothing to do for ``idle_s`` ends by itself; None: never.
@@ -78,7 +78,7 @@ class Crew(Generic[Task, Result]):
     def __init__(
         self,
         work: Callable[[Task], Result],
-        lost: Callable[[Task, Loss], Result],
+        lost: Callable[[Task, TaskFailure], Result],
         limits: Limits,
         idle_s: float | None = None,
     ) -> None:
@@ -92,13 +92,13 @@ class Crew(Generic[Task, Result]):
         Several processes whose tasks were not all answered, as after an error, are of no further use.
         """
         waiting, died = deque(range(len(tasks))), set[int]()
-        self._workers = [worker for worker in self._workers if not isinstance(worker.listen(), Loss)]
+        self._workers = [worker for worker in self._workers if not isinstance(worker.listen(), TaskFailure)]
         while waiting or self._busy:
             self._staff(min(workers, len(waiting) + self._busy))
             for index, answer in self._turn(waiting, tasks):
-                if not isinstance(answer, Loss):
+                if not isinstance(answer, TaskFailure):
                     yield index, answer.result()
-                elif answer is Loss.CRASHED and index not in died:
+                elif answer is TaskFailure.CRASHED and index not in died:
                     died.add(index)
                     waiting.appendleft(index)
                 else:
@@ -122,7 +122,7 @@ class Crew(Generic[Task, Result]):
             while len(self._workers) < count:
                 self._workers.append(_Worker(self._work, self._limits, self._idle_s))
 
-    def _turn(self, waiting: deque[int], tasks: Sequence[Task]) -> Iterator[tuple[int, Answer | Loss]]:
+    def _turn(self, waiting: deque[int], tasks: Sequence[Task]) -> Iterator[tuple[int, Answer | TaskFailure]]:
         """Hand out work, wait until something happens, and answer what became of tasks."""
         for worker in self._workers:
             if worker.ready and waiting:
@@ -133,7 +133,7 @@ class Crew(Generic[Task, Result]):
         wait([worker.connection for worker in self._workers], patience_s)
         for worker in tuple(self._workers):
             at, answer = worker.index, worker.listen()
-            if isinstance(answer, Loss):
+            if isinstance(answer, TaskFailure):
                 self._require_not_dismissed()
                 self._workers.remove(worker)
                 worker.require_started()
@@ -178,21 +178,21 @@ class _Worker:
         with suppress(BrokenPipeError):  # it died while it had nothing to do, and `listen` will say so
             self.connection.send(task)
 
-    def listen(self) -> Answer | Loss | None:
+    def listen(self) -> Answer | TaskFailure | None:
         """What it has to say now; None: nothing, or that it is ready for its first task."""
         try:
             answer = self.connection.recv() if self.connection.poll() else None
         except (EOFError, OSError):
             with _PROCESSES:
                 self._process.join()
-                return Loss.OUT_OF_MEMORY if self._process.exitcode == OUT_OF_MEMORY else Loss.CRASHED
+                return TaskFailure.OUT_OF_MEMORY if self._process.exitcode == OUT_OF_MEMORY else TaskFailure.CRASHED
         if answer is not None:
             self._started = self.ready = True
             self.index = self.deadline_s = None
             return answer if isinstance(answer, Answer) else None
         if self.deadline_s is not None and time.monotonic() >= self.deadline_s:
             self.kill()
-            return Loss.TIMEOUT
+            return TaskFailure.TIMEOUT
         return None
 
     def kill(self) -> None:

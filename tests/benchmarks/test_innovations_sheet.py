@@ -9,7 +9,7 @@ from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.innovations import mean_nis
 from benchmarks.report.innovations import innovations
 from benchmarks.report.report import report
-from benchmarks.report.report_data import Material
+from benchmarks.report.report_data import ReportData
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results
 from benchmarks.runner.run_suite import run_suite
@@ -79,9 +79,9 @@ def test_report_tells_the_mean_nis_of_its_cells_and_marks_what_lies_outside(tmp_
     (tmp_path / "suite.toml").write_text(SUITE, encoding="utf-8")
     suite, store = load_suite(tmp_path / "suite.toml"), Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
-    material = Material(suite, read_results(cells_of(suite, store), store), store)
-    (row,) = innovations(material).rows
-    cell = material.series["mec", "ekf"]
+    data = ReportData(suite, read_results(cells_of(suite, store), store), store)
+    (row,) = innovations(data).rows
+    cell = data.series["mec", "ekf"]
     assert row[:2] == ("ekf", "wifi")
     assert row[2] == f"{100.0 * cell.result.metrics['nis95_wifi']:.0f} %"
     bold, mean, low, high = re.fullmatch(
@@ -89,4 +89,4 @@ def test_report_tells_the_mean_nis_of_its_cells_and_marks_what_lies_outside(tmp_
     ).groups()
     assert mean == f"{np.nanmean(cell.fates.nis):.2f}"
     assert (bold is None) == (float(low) <= float(mean) <= float(high))
-    assert "**Innovations: mean NIS" in report(material)
+    assert "**Innovations: mean NIS" in report(data)

@@ -13,13 +13,13 @@ from benchmarks.limits.fix_bound import rssi_fix_bound
 from benchmarks.report.accuracy_figures import cost
 from benchmarks.report.cell_links import SCRIPT
 from benchmarks.report.report import FIGURES, as_page, report
-from benchmarks.report.report_data import Material
+from benchmarks.report.report_data import ReportData
 from benchmarks.report.sensitivity import WITHOUT_TUNE
 from benchmarks.report.tables import credibility, faults, fixes, outages
 from benchmarks.report.worst import command, worst_moments
 from benchmarks.review.review import review
 from benchmarks.runner.plan import cells_of
-from benchmarks.runner.results import by_contestant, read_results
+from benchmarks.runner.results import by_estimator, read_results
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
 from benchmarks.runner.suite import load_suite
@@ -62,18 +62,18 @@ def place(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def material(place):
+def data(place):
     suite, store = load_suite(place / "suite.toml"), Store(place / "store")
-    return Material(suite, read_results(cells_of(suite, store), store), store)
+    return ReportData(suite, read_results(cells_of(suite, store), store), store)
 
 
-def test_page_holds_verdicts_tables_figures_and_provenance(material):
-    page = report(material)
-    assert page.count("data:image/png;base64,") == sum(len(list(draw(material))) for draw in FIGURES.values())
+def test_page_holds_verdicts_tables_figures_and_provenance(data):
+    page = report(data)
+    assert page.count("data:image/png;base64,") == sum(len(list(draw(data))) for draw in FIGURES.values())
     for part in ("Leaderboard", "Pairs on pos_p75", "Faults", "Worst moments", "Lost cells", "Runs", "Estimators"):
         assert f"**{part}" in page
     assert "wheels" in page.splitlines()[2]
-    assert f"fusion bench run {shlex.join(material.words)}" in page
+    assert f"fusion bench run {shlex.join(data.words)}" in page
     assert "2 runs, 2 estimators, 1 fault, 1 seed: 8 cells" in page
 
 
@@ -84,40 +84,40 @@ def test_cost_is_drawn_once_it_was_measured(place, capsys):
     assert "wheels" in printed
     assert "peak MB" in printed
     suite, store = load_suite(place / "suite.toml"), Store(place / "store")
-    timed = Material(suite, read_results(cells_of(suite, store), store), store)
+    timed = ReportData(suite, read_results(cells_of(suite, store), store), store)
     assert timed.timing.keys() == {"wheels", "radio"}
     assert "Accuracy against cost" in report(timed)
-    assert not list(cost(Material(suite, timed.results, Store(place / "never timed"))))
+    assert not list(cost(ReportData(suite, timed.results, Store(place / "never timed"))))
 
 
-def test_distance_from_the_limit_is_told_where_it_is_asked_for(material):
-    assert "Times the physical limit" not in report(material)
-    page = report(material, limit=True)
+def test_distance_from_the_limit_is_told_where_it_is_asked_for(data):
+    assert "Times the physical limit" not in report(data)
+    page = report(data, limit=True)
     (row,) = re.findall(r"\| wheels \| \[([\d.]+)×\]\(#cell-\d+\) \| \[([\d.]+)×\]\(#cell-\d+\) \|", page)
     assert all(float(ratio) > 0.0 for ratio in row)
     assert "One perfect fix" in page
 
 
-def test_efficiency_of_fixes_is_that_of_the_bound_at_the_true_places(material):
-    cell = material.series["office", "radio"]
-    world, bound_m = material.run("office").world, material.fix_bound_m(cell)
+def test_efficiency_of_fixes_is_that_of_the_bound_at_the_true_places(data):
+    cell = data.series["office", "radio"]
+    world, bound_m = data.run("office").world, data.fix_bound_m(cell)
     x, y, heading = (float(column[7]) for column in (cell.instants.x, cell.instants.y, cell.instants.heading))
     assert bound_m[7] == pytest.approx(np.sqrt(np.trace(rssi_fix_bound(world, x, y, heading))), rel=1e-12)
     valid = cell.answers.valid
     ratio = np.sqrt(np.mean(bound_m[valid] ** 2) / np.mean(cell.error_m[valid] ** 2))
-    (row,) = [row for row in fixes(material).rows if row[0] == "radio"]
+    (row,) = [row for row in fixes(data).rows if row[0] == "radio"]
     assert row[1] == f"{100.0 * ratio:.0f} %"
 
 
-def test_credibility_is_told_where_seeds_can_tell_it(material, tmp_path):
+def test_credibility_is_told_where_seeds_can_tell_it(data, tmp_path):
     """Every second reading drawn anew for each seed makes radio fixes err anew; wheels do not hear of it."""
-    assert "Credibility" not in report(material)
-    assert credibility(material).rows == (("wheels", "–"), ("radio", "–"))
+    assert "Credibility" not in report(data)
+    assert credibility(data).rows == (("wheels", "–"), ("radio", "–"))
     text = SUITE.replace('name = "page"', 'name = "page"\nseeds = 6').replace('"wifi" }', '"wifi", p = 0.5 }')
     (tmp_path / "seeds.toml").write_text(text.replace('use = "radio_only"', 'use = "ekf"'), encoding="utf-8")
     suite, store = load_suite(tmp_path / "seeds.toml"), Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
-    seeded = Material(suite, read_results(cells_of(suite, store), store), store)
+    seeded = ReportData(suite, read_results(cells_of(suite, store), store), store)
     assert "Credibility" in report(seeded)
     rows = {row[0]: row[1:] for row in credibility(seeded).rows}
     assert rows["wheels"] == ("–",)
@@ -125,54 +125,54 @@ def test_credibility_is_told_where_seeds_can_tell_it(material, tmp_path):
     assert 0.0 < abs(incl) <= nci
 
 
-def test_fault_with_windows_is_told_by_what_happened_inside(material, tmp_path):
-    assert "While a fault lasts" not in report(material)
+def test_fault_with_windows_is_told_by_what_happened_inside(data, tmp_path):
+    assert "While a fault lasts" not in report(data)
     text = SUITE.replace('topic = "wifi" }', 'topic = "wifi", windows = [[5.0, 12.0]] }')
     (tmp_path / "windows.toml").write_text(text, encoding="utf-8")
     suite, store = load_suite(tmp_path / "windows.toml"), Store(tmp_path / "store")
     results = run_suite(suite, store, workers=1)
-    struck = Material(suite, results, store)
+    struck = ReportData(suite, results, store)
     assert "While a fault lasts" in report(struck)
     rows = {row[:2]: row[2:] for row in outages(struck).rows}
     assert rows["silence", "wheels"][0] == "100.0"
-    inside = [one.metrics for one in by_contestant(results, "silence")["radio"]]
+    inside = [one.metrics for one in by_estimator(results, "silence")["radio"]]
     for place, key in enumerate(("fault_availability", "fault_max_in_outage")):
         assert rows["silence", "radio"][place] == f"{100.0 * np.median([one[key] for one in inside]):.1f}"
     assert [row[-1] for row in rows.values()] == [row[1] for row in faults(struck).rows]
 
 
-def test_what_one_run_says_of_itself_is_told_only_where_it_is_the_only_one(material, tmp_path):
-    assert "within this run" not in report(material)
+def test_what_one_run_says_of_itself_is_told_only_where_it_is_the_only_one(data, tmp_path):
+    assert "within this run" not in report(data)
     office, _, rest = SUITE.partition('[[runs]]\nid = "mec"')
     (tmp_path / "one.toml").write_text(office + rest[rest.index("[[estimators]]") :], encoding="utf-8")
     suite, store = load_suite(tmp_path / "one.toml"), Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
-    page = report(Material(suite, read_results(cells_of(suite, store), store), store))
+    page = report(ReportData(suite, read_results(cells_of(suite, store), store), store))
     assert len(re.findall(r"- within this run, wheels beats radio by .*; says nothing of other runs", page)) == 1
     assert "cannot tell wheels from radio" in page
 
 
-def test_radio_without_radio_is_lost_and_said_to_be(material):
-    page = report(material)
+def test_radio_without_radio_is_lost_and_said_to_be(data):
+    page = report(data)
     assert re.search(r"\| radio \|.*∞", page)
     assert "office radio silence 0" in page
 
 
-def test_worst_moments_are_the_largest_errors(material):
-    found = worst_moments(material.results)
+def test_worst_moments_are_the_largest_errors(data):
+    found = worst_moments(data.results)
     largest = [result.metrics["pos_max"] for result in found]
     assert largest == sorted(largest, reverse=True)
     for result in found:
-        series = material.series[result.cell.run.id, result.cell.contestant.id]
+        series = data.series[result.cell.run.id, result.cell.estimator.id]
         at = np.argmax(np.where(np.isfinite(series.error_m), series.error_m, -1.0))
         assert result.metrics["pos_max"] == pytest.approx(series.error_m[at], rel=1e-12)
         assert result.worst_at_s == pytest.approx(series.time_s[at], abs=1e-6)
 
 
-def test_command_of_a_cell_makes_that_cell_again_and_finds_its_worst_moment(material, tmp_path, monkeypatch, capsys):
+def test_command_of_a_cell_makes_that_cell_again_and_finds_its_worst_moment(data, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (result,) = (one for one in material.results if str(one.cell) == "office wheels silence 0")
-    made, shown = (shlex.split(part)[1:] for part in command(result, material.words).split(" && "))
+    (result,) = (one for one in data.results if str(one.cell) == "office wheels silence 0")
+    made, shown = (shlex.split(part)[1:] for part in command(result, data.words).split(" && "))
     assert main(made) == 0
     assert "the same to the bit as in the store" in capsys.readouterr().err
     found = review(Path(shown[1]), estimators=[shown[shown.index("--estimators") + 1]], worst=5).moments
@@ -181,9 +181,9 @@ def test_command_of_a_cell_makes_that_cell_again_and_finds_its_worst_moment(mate
     assert float(shown[shown.index("--at") + 1]) == pytest.approx(result.worst_at_s, abs=0.006)
 
 
-def test_contestants_are_ordered_by_the_median_of_what_is_compared(material):
-    assert material.contestants == ["wheels", "radio"]
-    assert material.comparison.letters.keys() == {"wheels", "radio"}
+def test_estimators_are_ordered_by_the_median_of_what_is_compared(data):
+    assert data.estimators == ["wheels", "radio"]
+    assert data.comparison.letters.keys() == {"wheels", "radio"}
 
 
 def test_markdown_has_the_same_figures_but_nothing_to_click(place, tmp_path):
@@ -220,10 +220,10 @@ def entry_of(page, number):
     return re.search(rf'<li id="{anchor}">(.*)</li>', page).group(1)
 
 
-def test_numbers_lead_to_the_cells_they_come_from(material):
-    page = report(material)
+def test_numbers_lead_to_the_cells_they_come_from(data):
+    page = report(data)
     for run_id, *numbers in rows_of(page, "Run by run"):
-        for name, number in zip(material.contestants, numbers, strict=True):
+        for name, number in zip(data.estimators, numbers, strict=True):
             entry = entry_of(page, number)
             assert entry.startswith(f"{run_id}: ")
             assert f" {run_id} {name} -o " in entry
@@ -232,7 +232,7 @@ def test_numbers_lead_to_the_cells_they_come_from(material):
         assert f" {name} --fault silence " in entry_of(page, number)
     for row in rows_of(page, "Leaderboard"):
         p75 = entry_of(page, row[9])
-        assert f"pos_p75 {re.match(r'.(.*?)]', row[9]).group(1)} cm" in p75 or len(material.scored_runs) % 2 == 0
+        assert f"pos_p75 {re.match(r'.(.*?)]', row[9]).group(1)} cm" in p75 or len(data.scored_runs) % 2 == 0
         worst = entry_of(page, row[4])
         assert f"pos_p75 {re.match(r'.(.*?)]', row[4]).group(1)} cm" in worst
     (told,) = re.findall(r"^- .*\(\[where\]\(#(cell-\d+)\)\)$", page, re.MULTILINE)
@@ -256,9 +256,9 @@ addEventListener("load", () => {
 
 
 @CHROMIUM
-def test_click_on_a_number_opens_its_cell_and_its_command_can_be_copied(material, tmp_path):
+def test_click_on_a_number_opens_its_cell_and_its_command_can_be_copied(data, tmp_path):
     page = tmp_path / "page.html"
-    page.write_bytes(as_html("page", report(material), SCRIPT).replace(b"</body>", CLICKED.encode() + b"</body>"))
+    page.write_bytes(as_html("page", report(data), SCRIPT).replace(b"</body>", CLICKED.encode() + b"</body>"))
     done = chromium(tmp_path, "--virtual-time-budget=5000", "--dump-dom", page.as_uri())
     shown = html.unescape(re.search(r'data-found="([^"]*)"', done.stdout).group(1))
     assert re.fullmatch(r"true;true;(copied|press Ctrl-C) fusion bench replay .* --at [0-9.]+", shown)
@@ -277,13 +277,13 @@ def test_browser_draws_the_page_without_console_errors(place, tmp_path):
     assert picture.stat().st_size > 20_000
 
 
-def test_page_is_a_baseline_for_the_gate(place, material, tmp_path, capsys):
+def test_page_is_a_baseline_for_the_gate(place, data, tmp_path, capsys):
     page, gated = tmp_path / "page.html", tmp_path / "gated.toml"
-    page.write_bytes(as_page(material))
+    page.write_bytes(as_page(data))
     gated.write_text(SUITE + "[gate]\nratio = { pos_p75 = 0.05 }\n", encoding="utf-8")
     words = ["bench", "gate", str(gated), "--store", str(place / "store"), "--baseline", str(page)]
     assert main(words) == 0
-    assert capsys.readouterr().out.count("pos_p75 is what it was") == len(material.contestants)
+    assert capsys.readouterr().out.count("pos_p75 is what it was") == len(data.estimators)
     text = page.read_text(encoding="utf-8")
     page.write_text(re.sub(r'"pos_p75": [\d.e-]+', '"pos_p75": 1e-9', text), encoding="utf-8")
     assert main(words) == 1
@@ -319,16 +319,16 @@ def grid_of(folder, text):
     (folder / "grid.toml").write_text(text, encoding="utf-8")
     suite, store = load_suite(folder / "grid.toml"), Store(folder / "store")
     run_suite(suite, store, workers=1)
-    return Material(suite, read_results(cells_of(suite, store), store), store)
+    return ReportData(suite, read_results(cells_of(suite, store), store), store)
 
 
-def test_parameters_of_a_grid_are_compared_with_the_default_tune_runs_apart(material, tmp_path):
-    assert "**Parameters" not in report(material)
+def test_parameters_of_a_grid_are_compared_with_the_default_tune_runs_apart(data, tmp_path):
+    assert "**Parameters" not in report(data)
     grid = grid_of(tmp_path, GRID)
     page = report(grid)
     first, second = rows_of(page, "Parameters")
     assert second == ["radio", "window_s", "2.5 (default)", "–", "–"]
-    p75 = {(one.cell.run.id, one.cell.contestant.id): one.metrics["pos_p75"] for one in grid.results}
+    p75 = {(one.cell.run.id, one.cell.estimator.id): one.metrics["pos_p75"] for one in grid.results}
     ratio = {
         run: p75[run, "radio[window_s=1.0]"] / p75[run, "radio[window_s=2.5]"] for run in ("office", "mec", "arena")
     }

@@ -16,7 +16,7 @@ from benchmarks.report.consistency import consistency
 from benchmarks.report.innovations import innovations
 from benchmarks.report.maps import maps
 from benchmarks.report.report import FIGURES, as_page
-from benchmarks.report.report_data import Material
+from benchmarks.report.report_data import ReportData
 from benchmarks.report.sensitivity import curves, sweeps
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
@@ -55,20 +55,20 @@ grid = { window_s = [1.0, 2.5] }
 
 
 @pytest.fixture(scope="module")
-def material(tmp_path_factory):
+def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp("figures")
     (folder / "suite.toml").write_text(SUITE, encoding="utf-8")
     suite, store = load_suite(folder / "suite.toml"), Store(folder / "store")
     results = run_suite(suite, store, workers=1)
     assert main(["bench", "time", str(folder / "suite.toml"), "--store", str(folder / "store"), "--repeats", "1"]) == 0
-    return Material(suite, results, store)
+    return ReportData(suite, results, store)
 
 
 @pytest.fixture(scope="module")
-def panels(material):
+def panels(data):
     """All of them, by the name of their figure."""
-    drawn = {name: list(draw(material)) for name, draw in FIGURES.items()}
-    return drawn | {"parameters": list(curves(material, sweeps(material)))}
+    drawn = {name: list(draw(data)) for name, draw in FIGURES.items()}
+    return drawn | {"parameters": list(curves(data, sweeps(data)))}
 
 
 def targets_of(panel):
@@ -76,10 +76,10 @@ def targets_of(panel):
     return json.loads(html.unescape(re.search(r'data-targets="([^"]*)"', panel.block()).group(1)))
 
 
-def entry_of(material, anchor):
-    """Run and contestant of the cell that an anchor leads to."""
-    (cell,) = (result.cell for result in material.results if material.anchor(result) == anchor)
-    return cell.run.id, cell.contestant.id
+def entry_of(data, anchor):
+    """Run and estimator of the cell that an anchor leads to."""
+    (cell,) = (result.cell for result in data.results if data.anchor(result) == anchor)
+    return cell.run.id, cell.estimator.id
 
 
 def test_every_figure_is_drawn_whole(panels):
@@ -100,41 +100,41 @@ def test_every_figure_is_drawn_whole(panels):
         assert inked.y1 <= height, panel.title
 
 
-def test_every_panel_leads_to_cells_that_it_names(panels, material):
+def test_every_panel_leads_to_cells_that_it_names(panels, data):
     for panel in (panel for drawn in panels.values() for panel in drawn):
         assert targets_of(panel)
         for anchor, said, *_ in targets_of(panel):
-            run_id, contestant = entry_of(material, anchor)
-            assert contestant.partition("[")[0] in said
+            run_id, estimator = entry_of(data, anchor)
+            assert estimator.partition("[")[0] in said
             assert run_id in said or panel.title == "Accuracy against cost"
 
 
-def test_what_leads_lies_where_the_picture_has_ink_of_that_colour(panels, material):
+def test_what_leads_lies_where_the_picture_has_ink_of_that_colour(panels, data):
     """The places are worked out apart from the picture: here they are looked up in it."""
     from matplotlib.image import imread
 
     for panel in (panels["accuracy"][1], *panels["consistency"], *panels["cost"]):
         pixels = imread(BytesIO(as_png(panel.figure)))[:, :, :3]
         for anchor, said, xs, ys in targets_of(panel):
-            colour = plain_colour(material.use(entry_of(material, anchor)[1]))
+            colour = plain_colour(data.use(entry_of(data, anchor)[1]))
             row, column = (int(place * size / 1e4) for place, size in zip((ys[0], xs[0]), pixels.shape, strict=False))
             near = pixels[row - 2 : row + 3, column - 2 : column + 3].reshape(-1, 3)
             assert np.abs(near - colour).max(axis=1).min() < 0.1, said
 
 
-def test_line_over_time_leads_to_its_moments_the_worst_among_them(material):
-    for panel, run_id in zip(over_time(material), material.scored_runs, strict=True):
-        found = {entry_of(material, anchor): times for anchor, _, _, _, times in targets_of(panel)}
-        assert {name for _, name in found} == set(material.contestants)
+def test_line_over_time_leads_to_its_moments_the_worst_among_them(data):
+    for panel, run_id in zip(over_time(data), data.scored_runs, strict=True):
+        found = {entry_of(data, anchor): times for anchor, _, _, _, times in targets_of(panel)}
+        assert {name for _, name in found} == set(data.estimators)
         for (run, name), times in found.items():
-            result = material.series[run, name].result
+            result = data.series[run, name].result
             assert run == run_id
             assert len(times) <= LEADING
             assert min(abs(np.array(times) - result.worst_at_s)) < 0.006
 
 
-def test_track_on_a_map_leads_to_the_moment_it_was_there(material):
-    panel, series = next(maps(material)), material.series["office", material.contestants[0]]
+def test_track_on_a_map_leads_to_the_moment_it_was_there(data):
+    panel, series = next(maps(data)), data.series["office", data.estimators[0]]
     ((_, _, xs, ys, times),) = targets_of(panel)
     pixels = np.column_stack([xs, 1e4 - np.array(ys)]) / 1e4 * panel.figure.bbox.size
     there = panel.axes.transData.inverted().transform(pixels)
@@ -142,21 +142,21 @@ def test_track_on_a_map_leads_to_the_moment_it_was_there(material):
     assert there == pytest.approx(np.column_stack([series.answers.x[at], series.answers.y[at]]), abs=0.02)
 
 
-def test_point_of_a_distribution_leads_to_the_instant_with_that_error(material):
-    panel = next(accuracy(material))
+def test_point_of_a_distribution_leads_to_the_instant_with_that_error(data):
+    panel = next(accuracy(data))
     for anchor, _, xs, _, times in targets_of(panel):
-        series = material.series[entry_of(material, anchor)]
+        series = data.series[entry_of(data, anchor)]
         pixels = np.column_stack([xs, np.zeros(len(xs))]) / 1e4 * panel.figure.bbox.size
         error_cm = panel.axes.transData.inverted().transform(pixels)[:, 0]
         at = [int(np.argmin(abs(series.time_s - time_s))) for time_s in times]
         assert error_cm == pytest.approx(100.0 * series.error_m[at], rel=0.01)
 
 
-def test_consistency_draws_what_the_tables_say_and_crosses_what_lies_outside(material):
-    answers, readings = consistency(material)
-    cells = [one for one in material.results if one.cell.run.split == "test" and np.isfinite(one.metrics["anees"])]
-    assert {anchor for anchor, *_ in targets_of(answers)} == {material.anchor(one) for one in cells}
-    told = [cell for row in innovations(material).rows for cell in row[3:]]
+def test_consistency_draws_what_the_tables_say_and_crosses_what_lies_outside(data):
+    answers, readings = consistency(data)
+    cells = [one for one in data.results if one.cell.run.split == "test" and np.isfinite(one.metrics["anees"])]
+    assert {anchor for anchor, *_ in targets_of(answers)} == {data.anchor(one) for one in cells}
+    told = [cell for row in innovations(data).rows for cell in row[3:]]
     assert told
     assert [link_of(*target[:2]) for target in targets_of(readings)] == [cell.replace("**", "") for cell in told]
     bands = [[one.metrics[f"anees{key}"] for key in ("_band_low", "", "_band_high")] for one in cells]
@@ -214,9 +214,9 @@ addEventListener("load", async () => {
 
 @CHROMIUM
 @pytest.mark.parametrize("size", ["1200,900", "500,800"])
-def test_click_on_any_point_shows_its_cell_and_the_command_for_its_moment(material, panels, tmp_path, size):
+def test_click_on_any_point_shows_its_cell_and_the_command_for_its_moment(data, panels, tmp_path, size):
     page = tmp_path / "page.html"
-    page.write_bytes(as_page(material).replace(b"</body>", CLICKS.encode() + b"</body>"))
+    page.write_bytes(as_page(data).replace(b"</body>", CLICKS.encode() + b"</body>"))
     words = (f"--window-size={size}", "--virtual-time-budget=60000", "--dump-dom", page.as_uri())
     done = chromium(tmp_path, *words)
     assert "CONSOLE" not in done.stderr

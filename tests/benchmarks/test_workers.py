@@ -13,7 +13,7 @@ from functools import partial
 import pytest
 
 from benchmarks.runner.worker_process import peak_rss_bytes
-from benchmarks.runner.workers import Crew, Limits, Loss, compute
+from benchmarks.runner.workers import Limits, TaskFailure, WorkerPool, compute
 
 POWERS = [partial(pow, 2, k) for k in range(6)]
 
@@ -55,12 +55,12 @@ def die_once_and_hang(marker, fifo):
 
 
 @contextmanager
-def crew_of(**options):
-    crew = Crew(operator.call, lost, Limits(), **options)
+def pool_of(**options):
+    pool = WorkerPool(operator.call, lost, Limits(), **options)
     try:
-        yield crew
+        yield pool
     finally:
-        crew.dismiss()
+        pool.dismiss()
 
 
 def take_memory_briefly(megabytes):
@@ -77,7 +77,7 @@ def test_all_results_come_whatever_the_workers(workers):
 
 
 def test_a_worker_that_dies_twice_costs_its_own_task_only():
-    assert done(with_second(partial(os._exit, 1))) == expected(Loss.CRASHED)
+    assert done(with_second(partial(os._exit, 1))) == expected(TaskFailure.CRASHED)
 
 
 def test_a_worker_that_dies_once_gets_another_try(tmp_path):
@@ -85,20 +85,20 @@ def test_a_worker_that_dies_once_gets_another_try(tmp_path):
 
 
 def test_a_task_that_hangs_is_ended_and_costs_itself_only():
-    assert done(with_second(partial(time.sleep, 3600.0)), wall_s=1.0) == expected(Loss.TIMEOUT)
+    assert done(with_second(partial(time.sleep, 3600.0)), wall_s=1.0) == expected(TaskFailure.TIMEOUT)
 
 
 def test_a_task_that_takes_too_much_memory_is_ended_and_costs_itself_only():
-    assert done(with_second(partial(take_memory, 900)), rss_mb=600.0) == expected(Loss.OUT_OF_MEMORY)
+    assert done(with_second(partial(take_memory, 900)), rss_mb=600.0) == expected(TaskFailure.OUT_OF_MEMORY)
 
 
 def test_memory_that_was_taken_for_a_moment_is_not_charged_to_the_next_task():
     tasks = [partial(take_memory_briefly, 154), *POWERS[1:]]
-    assert done(tasks, 1, rss_mb=150.0) == {0: Loss.OUT_OF_MEMORY} | {k: 2**k for k in range(1, 6)}
+    assert done(tasks, 1, rss_mb=150.0) == {0: TaskFailure.OUT_OF_MEMORY} | {k: 2**k for k in range(1, 6)}
 
 
 def test_limits_hold_for_one_worker_too():
-    assert done([partial(time.sleep, 3600.0)], 1, wall_s=1.0) == {0: Loss.TIMEOUT}
+    assert done([partial(time.sleep, 3600.0)], 1, wall_s=1.0) == {0: TaskFailure.TIMEOUT}
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -115,36 +115,36 @@ def test_workers_end_when_nobody_takes_results_any_more():
 
 
 def test_crew_keeps_its_process_for_the_next_tasks():
-    with crew_of() as crew:
-        assert list(crew.compute([os.getpid], 1)) == list(crew.compute([os.getpid], 1)) != [(0, os.getpid())]
+    with pool_of() as pool:
+        assert list(pool.compute([os.getpid], 1)) == list(pool.compute([os.getpid], 1)) != [(0, os.getpid())]
 
 
 def test_process_that_died_between_tasks_costs_the_next_one_no_try(tmp_path):
-    with crew_of() as crew:
-        ((_, pid),) = crew.compute([os.getpid], 1)
+    with pool_of() as pool:
+        ((_, pid),) = pool.compute([os.getpid], 1)
         os.kill(pid, signal.SIGKILL)
         os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
-        assert list(crew.compute([partial(die_once, tmp_path / "was-here")], 1)) == [(0, "second try")]
+        assert list(pool.compute([partial(die_once, tmp_path / "was-here")], 1)) == [(0, "second try")]
 
 
 def test_process_with_nothing_to_do_ends_and_another_takes_the_next_task():
-    with crew_of(idle_s=1.0) as crew:
-        ((_, first),) = crew.compute([os.getpid], 1)
+    with pool_of(idle_s=1.0) as pool:
+        ((_, first),) = pool.compute([os.getpid], 1)
         os.waitid(os.P_PID, first, os.WEXITED | os.WNOWAIT)
-        ((_, second),) = crew.compute([os.getpid], 1)
+        ((_, second),) = pool.compute([os.getpid], 1)
         assert first != second
 
 
 def test_task_of_a_crew_that_is_dismissed_is_not_lost_but_cancelled(tmp_path):
     os.mkfifo(tmp_path / "fifo")
-    with ThreadPoolExecutor() as pool, crew_of() as crew:
+    with ThreadPoolExecutor() as pool, pool_of() as pool:
         task = partial(die_once_and_hang, tmp_path / "was-here", tmp_path / "fifo")
-        results = pool.submit(list, crew.compute([task], 1))
+        results = pool.submit(list, pool.compute([task], 1))
         assert (tmp_path / "fifo").read_text(encoding="ascii") == "second try"
-        crew.dismiss()
+        pool.dismiss()
         assert isinstance(results.exception(), CancelledError)
         with pytest.raises(CancelledError):
-            list(crew.compute(POWERS, 1))
+            list(pool.compute(POWERS, 1))
 
 
 def test_words_hash_alike_whatever_the_environment_says(monkeypatch):

@@ -41,7 +41,7 @@ def test_suite_of_the_docs_is_a_suite(tmp_path):
     (text,) = blocks(ROOT / "docs" / "benchmark.md", "toml")
     (tmp_path / "hall.toml").write_text(text, encoding="utf-8")
     suite = load_suite(tmp_path / "hall.toml")
-    assert [contestant.params for contestant in suite.contestants] == [
+    assert [estimator.params for estimator in suite.estimators] == [
         {"gate_probability": 0.99},
         {"gate_probability": 0.999},
     ]

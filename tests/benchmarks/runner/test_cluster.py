@@ -130,7 +130,7 @@ def digests(results):
 
 
 def statuses(results):
-    return {result.cell.contestant.id: result.status for result in results}
+    return {result.cell.estimator.id: result.status for result in results}
 
 
 def everything(store):

@@ -32,13 +32,13 @@ def test_smallest_suite_has_defaults_and_the_clean_fault(tmp_path):
     assert suite.folder == tmp_path.resolve()
 
 
-def test_grid_is_spread_into_contestants_with_their_own_ids(tmp_path):
+def test_grid_is_spread_into_estimators_with_their_own_ids(tmp_path):
     grid = 'params = { bias_std_m = 0.1 }\ngrid = { gate_probability = [0.9, 0.99], scale = ["a", "b"] }\n'
     suite = load_suite(written(tmp_path, SUITE + grid))
-    assert [one.id for one in suite.contestants] == [
+    assert [one.id for one in suite.estimators] == [
         f"ekf[gate_probability={gate},scale={scale}]" for gate in (0.9, 0.99) for scale in "ab"
     ]
-    assert suite.contestants[0].params == {"bias_std_m": 0.1, "gate_probability": 0.9, "scale": "a"}
+    assert suite.estimators[0].params == {"bias_std_m": 0.1, "gate_probability": 0.9, "scale": "a"}
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_wrong_head_is_refused(tmp_path, line, message):
 def test_parameters_tuned_on_a_tune_run_may_be_judged_on_another(tmp_path):
     more = '[[runs]]\nid = "b"\nscenario = "office"\nsplit = "tune"\n'
     more += '[[estimators]]\nid = "pf"\nuse = "particle"\ntuned_on = ["b"]\n'
-    assert load_suite(written(tmp_path, SUITE + more)).contestants[1].tuned_on == ("b",)
+    assert load_suite(written(tmp_path, SUITE + more)).estimators[1].tuned_on == ("b",)
 
 
 def test_missing_suite_is_told(tmp_path):

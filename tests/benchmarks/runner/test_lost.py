@@ -6,7 +6,7 @@ import pytest
 
 import fusion
 from benchmarks.cli import bench_run as run_verb
-from benchmarks.report.report_data import Material
+from benchmarks.report.report_data import ReportData
 from benchmarks.report.tables import fixes, leaderboard, limits, lost
 from benchmarks.runner import leaderboard as stored
 from benchmarks.runner.execute import carry_out
@@ -54,7 +54,7 @@ class Poisoned(DeadReckoning):
 
 
 @pytest.fixture(scope="module", params=["causal", "interp"])
-def material(request, tmp_path_factory):
+def data(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp(request.param)
     (folder / "suite.toml").write_text(SUITE.format(reading=request.param), encoding="utf-8")
     suite, store = load_suite(folder / "suite.toml"), Store(folder / "store")
@@ -62,26 +62,26 @@ def material(request, tmp_path_factory):
         cells = cells_of(suite, store)
         for cell in cells:
             carry_out((cell, store.folder))
-        yield Material(suite, read_results(cells, store), store)
+        yield ReportData(suite, read_results(cells, store), store)
 
 
-def of(material, contestant, fault="clean"):
-    (found,) = [one for one in material.results if (one.cell.contestant.id, one.cell.fault.id) == (contestant, fault)]
+def of(data, estimator, fault="clean"):
+    (found,) = [one for one in data.results if (one.cell.estimator.id, one.cell.fault.id) == (estimator, fault)]
     return found
 
 
-def test_answer_that_is_no_number_loses_the_cell_with_its_reason(material):
-    poisoned = of(material, "poisoned")
+def test_answer_that_is_no_number_loses_the_cell_with_its_reason(data):
+    poisoned = of(data, "poisoned")
     assert poisoned.status == "diverged"
     assert poisoned.error.startswith(CAUSE)
     assert (poisoned.metrics["availability"], poisoned.metrics["pos_p75"]) == (0.0, math.inf)
-    assert all(math.isfinite(of(material, "wheels").metrics[name]) for name in FLATTERING)
+    assert all(math.isfinite(of(data, "wheels").metrics[name]) for name in FLATTERING)
     assert all(math.isnan(poisoned.metrics[name]) for name in FLATTERING)
     assert poisoned.worst_at_s is None
 
 
-def test_cell_that_fell_silent_keeps_its_availability_and_no_mean_of_its_answers(material):
-    silent = of(material, "radio", "silence")
+def test_cell_that_fell_silent_keeps_its_availability_and_no_mean_of_its_answers(data):
+    silent = of(data, "radio", "silence")
     assert silent.status == "diverged"
     assert 0.0 < silent.metrics["availability"] <= 0.5
     assert silent.error == f"only {100.0 * silent.metrics['availability']:.1f} % of the instants have a valid answer"
@@ -89,22 +89,22 @@ def test_cell_that_fell_silent_keeps_its_availability_and_no_mean_of_its_answers
     assert silent.metrics["pos_p75"] == math.inf
 
 
-def test_leaderboards_show_a_dash_and_the_run_tells_why(material):
-    for sheet in (stored.leaderboard(material.results), leaderboard(material)):
+def test_leaderboards_show_a_dash_and_the_run_tells_why(data):
+    for sheet in (stored.leaderboard(data.results), leaderboard(data)):
         (row,) = [row for row in sheet.rows if row[0] == "poisoned"]
         shown = dict(zip(sheet.head, row, strict=True))
         assert [
             text for title, text in shown.items() if title.startswith(("RMSE", "mean", "max", "heading", "ANEES"))
         ] == ["–"] * 5
         assert sheet.rows[-1][0] == "poisoned"
-    told = run_verb.lost(material.results)
+    told = run_verb.lost(data.results)
     assert any(line.startswith(f"poisoned lost 2 of its cells: {CAUSE}") for line in told)
     assert any(line.startswith("radio lost 1 of its cells: only ") for line in told)
 
 
-def test_report_says_why_and_compares_no_lost_cell_with_physics(material):
-    reasons = {row[0].partition("]")[0]: row[2] for row in lost(material).rows}
+def test_report_says_why_and_compares_no_lost_cell_with_physics(data):
+    reasons = {row[0].partition("]")[0]: row[2] for row in lost(data).rows}
     assert reasons["[office poisoned clean 0"].startswith(f"`{CAUSE}")
-    for sheet in (limits(material), fixes(material)):
+    for sheet in (limits(data), fixes(data)):
         shown = {row[0]: row[1] for row in sheet.rows}
         assert shown["poisoned"] == "–" != shown["wheels"]

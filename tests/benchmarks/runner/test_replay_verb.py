@@ -81,7 +81,7 @@ def test_command_compares_with_the_store_and_refuses_ids_with_the_nearest(suite,
         assert hint in capsys.readouterr().err
 
 
-def test_log_of_a_contestant_that_crashed_holds_all_that_was_measured(tmp_path, suite):
+def test_log_of_a_estimator_that_crashed_holds_all_that_was_measured(tmp_path, suite):
     (tmp_path / "again.toml").write_text(HEAD.replace("gate_probability = 0.99", "gate_probability = 7.0"))
     cell = one_cell(load_suite(tmp_path / "again.toml"), Store(tmp_path / "store"), "office", "mine")
     assert replay_cell(cell, tmp_path / "cell.mcap") == ""

@@ -27,7 +27,7 @@ from benchmarks.runner.results import flat, read_results
 from benchmarks.runner.run_source import open_run
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite import Contestant, load_suite
+from benchmarks.runner.suite import EstimatorSpec, load_suite
 from fusion import FusionError, SuiteError, registered
 from fusion.cli.main import main
 from logs.prior import begin_ns
@@ -308,8 +308,8 @@ def test_parameters_that_a_plug_in_refuses_in_its_own_way_are_refused(
     suite, tmp_path, monkeypatch, hated, share, refused
 ):
     monkeypatch.setattr(Fussy, "hated", hated)
-    theirs = Contestant("theirs", "fussy", {"share": share})
-    cells = [cell._replace(contestant=theirs) for cell in cells_of(suite, Store(tmp_path / "store"))]
+    theirs = EstimatorSpec("theirs", "fussy", {"share": share})
+    cells = [cell._replace(estimator=theirs) for cell in cells_of(suite, Store(tmp_path / "store"))]
     with (
         registered("fussy", Fussy),
         pytest.raises(SuiteError, match=r"theirs: .*share 2.0") if refused else nullcontext(),
@@ -362,11 +362,11 @@ def test_plan_and_run_tell_what_they_did(suite, tmp_path, capsys):
     assert (counts["cells"], counts["cached"], counts["missing_estimates"]) == (8, 8, 0)
 
 
-def test_leaderboard_puts_a_lost_contestant_last_whatever_its_other_cells(suite, tmp_path):
+def test_leaderboard_puts_a_lost_estimator_last_whatever_its_other_cells(suite, tmp_path):
     results = run_suite(suite, Store(tmp_path / "store"), workers=1)
     best = leaderboard(results).rows[0][0]
     spoilt = [
-        result._replace(status="crashed") if result.cell.contestant.id == best and result.cell.seed == 0 else result
+        result._replace(status="crashed") if result.cell.estimator.id == best and result.cell.seed == 0 else result
         for result in results
     ]
     rows = leaderboard(spoilt).rows

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.runner import suite as definition
-from benchmarks.runner.plan import contestant_spec, read_faults
+from benchmarks.runner.plan import estimator_identity, read_faults
 from benchmarks.runner.suite import builtin_suites, load_suite
 from fusion import SuiteError
 from fusion.cli.main import main
@@ -24,8 +24,8 @@ DATA = Path(__file__).resolve().parents[3].parent / "shared" / "data"
 def test_suite_loads_and_names_what_exists(name):
     suite = load_suite(SUITES / f"{name}.toml")
     assert suite.name == name
-    for contestant in suite.contestants:
-        contestant_spec(contestant)
+    for estimator in suite.estimators:
+        estimator_identity(estimator)
     for faults in suite.faults:
         read_faults(faults)
     assert {run.scenario for run in suite.runs} <= {*builtin_names(), None}
@@ -105,9 +105,9 @@ def test_built_in_suite_does_without_packages_that_a_base_install_lacks(name, mo
     for module in ("estimators.filterpy_ekf", "estimators.filterpy_ekf"):
         monkeypatch.delitem(sys.modules, module, raising=False)
     suite = load_suite(Path(name))
-    assert not [one.use for one in suite.contestants if one.use.startswith("filterpy")]
-    for contestant in suite.contestants:
-        contestant_spec(contestant)
+    assert not [one.use for one in suite.estimators if one.use.startswith("filterpy")]
+    for estimator in suite.estimators:
+        estimator_identity(estimator)
 
 
 def test_suites_have_enough_runs_for_a_verdict():

@@ -48,8 +48,8 @@ def suite(tmp_path_factory):
     )
     entries = "".join(f"{name} = trouble_plugin:{name.capitalize()}\n" for name in NAMES)
     (site / "trouble_plugin-1.dist-info" / "entry_points.txt").write_text(f"[fusion.estimators]\n{entries}")
-    contestants = [f'[[estimators]]\nid = "{name}"\nuse = "{name}"\n' for name in (*NAMES, "dead_reckoning")]
-    (folder / "suite.toml").write_text(SUITE + "".join(contestants), encoding="utf-8")
+    estimators = [f'[[estimators]]\nid = "{name}"\nuse = "{name}"\n' for name in (*NAMES, "dead_reckoning")]
+    (folder / "suite.toml").write_text(SUITE + "".join(estimators), encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(site)
         words = [str(folder / "suite.toml"), "--store", str(folder / "store")]
@@ -70,7 +70,7 @@ def test_time_names_who_has_none_and_why(suite, capsys):
         (line,) = [line for line in said.err.splitlines() if f" {name} has no time" in line]
         assert why in line
     with open(f"{suite[-1]}/timing.json", encoding="utf-8") as stream:
-        assert [row["contestant"] for row in json.load(stream)["untimed"]] == list(NAMES)
+        assert [row["estimator"] for row in json.load(stream)["untimed"]] == list(NAMES)
 
 
 def statuses(words, capsys):

@@ -17,7 +17,7 @@ from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import comparison, flat, score_matrix, stored_results
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite import Contestant, FaultSet, Gate, RunSource, load_suite
+from benchmarks.runner.suite import EstimatorSpec, FaultSet, Gate, RunSource, load_suite
 from benchmarks.runner.timing import measure
 from benchmarks.runner.verify import differing
 from benchmarks.runner.workers import Limits
@@ -61,11 +61,11 @@ def words(place, verb, *more):
     return ["bench", verb, str(place / "suite.toml"), "--store", str(place / "store"), *more]
 
 
-def scaled(results, contestant, factors):
-    """The results with one contestant's p75 multiplied, run by run."""
+def scaled(results, estimator, factors):
+    """The results with one estimator's p75 multiplied, run by run."""
     return [
         result._replace(metrics={**result.metrics, "pos_p75": factors[k % 8] * result.metrics["pos_p75"]})
-        if result.cell.contestant.id == contestant
+        if result.cell.estimator.id == estimator
         else result
         for k, result in ((int(result.cell.run.id.removeprefix("run")), result) for result in results)
     ]
@@ -77,7 +77,7 @@ def baseline_of(results):
 
 
 def test_matrix_has_one_row_a_run_and_infinity_where_a_run_was_lost(results):
-    own = [result for result in results if result.cell.contestant.id == "wheels"]
+    own = [result for result in results if result.cell.estimator.id == "wheels"]
     assert score_matrix(own, "pos_p75").shape == (8, 1)
     assert np.isinf(score_matrix(own, "no_such_metric")).all()
 
@@ -149,7 +149,7 @@ def test_a_cell_that_is_lost_now_and_was_not_before_is_a_regression(results):
     assert judge(lost, Gate(), baseline_of(lost)) == []
 
 
-def test_contestant_that_the_baseline_does_not_know_cannot_be_told(results):
+def test_estimator_that_the_baseline_does_not_know_cannot_be_told(results):
     known = {"wheels": baseline_of(results)["wheels"]}
     assert Outcome.CANNOT_TELL in outcomes(judge(results, Gate(ratio={"pos_p75": 0.05}), known))
 
@@ -324,7 +324,7 @@ def test_peak_memory_is_that_of_the_estimator_in_a_process_of_its_own(tmp_path):
 
 
 def test_what_an_estimator_says_breaks_no_export():
-    cell = SimpleNamespace(run=RunSource("a"), fault=FaultSet("clean"), contestant=Contestant("b", "b"), seed=0)
+    cell = SimpleNamespace(run=RunSource("a"), fault=FaultSet("clean"), estimator=EstimatorSpec("b", "b"), seed=0)
     lost = SimpleNamespace(cell=cell, status="crashed", error="red \x1b[31m & <b>\x00")
     failure = ElementTree.fromstring(as_junit(SimpleNamespace(name="s"), [lost])).find("testcase/failure")
     assert failure.text == "red ?[31m & <b>?"
