@@ -6,10 +6,11 @@ import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.runner.adhoc_suite import bench, pooled, remarks, write_records
+from benchmarks.runner.adhoc_suite import bench, remarks, tables, write_records
 from fusion.cli.arguments import at_least_one, not_negative
 from fusion.cli.options import parse_settings
 from fusion.output.progress import progress_bar
+from fusion.output.tables import print_sheets
 from fusion.plugins import left_out
 
 
@@ -29,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Bench, print the tables, write the records. Exit code 1 when no estimator survived."""
     chosen = None if arguments.estimators is None else arguments.estimators.split(",")
     with progress_bar("bench") as progress:
-        scores = bench(
+        results = bench(
             arguments.runs,
             estimators=chosen,
             settings=parse_settings(arguments.set),
@@ -37,12 +38,10 @@ def run(arguments: argparse.Namespace) -> int:
             workers=arguments.workers,
             progress=progress,
         )
-    for remark in (*(left_out() if chosen is None else ()), *remarks(scores)):
+    for remark in (*(left_out() if chosen is None else ()), *remarks(results)):
         sys.stderr.write(f"fusion bench: {remark}\n")
     if arguments.json != Path("-"):
-        from benchmarks.runner.leaderboard import print_tables
-
-        print_tables(scores, pooled(scores))
+        print_sheets(tables(results))
     if arguments.json is not None:
-        write_records(scores, arguments.json)
-    return 1 if all(score.status == "crashed" for score in scores) else 0
+        write_records(results, arguments.json)
+    return 1 if all(result.status == "crashed" for result in results) else 0

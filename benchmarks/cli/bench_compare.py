@@ -6,10 +6,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from benchmarks.cli.suite_arguments import suite_options
+from benchmarks.cli.suite_arguments import stored_results, suite_options
 from benchmarks.metrics.catalogue import RANKED_BY, require_lower_is_better
-from benchmarks.runner.leaderboard import sheet
-from benchmarks.runner.results import Result, comparison, require_metric, stored_results
+from benchmarks.runner.leaderboard import pair_table
+from benchmarks.runner.results import Result, comparison, require_metric
 from benchmarks.runner.suite import CLEAN
 from fusion import ParameterError
 from fusion.errors import did_you_mean
@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     judged = comparison(chosen, arguments.metric, arguments.fault)
     for verdict in judged.verdicts:
         sys.stdout.write(f"{verdict.sentence}\n")
-    print_sheets([sheet(judged)])
+    print_sheets([pair_table(judged)])
     return 0
 
 

@@ -6,9 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.cli.suite_arguments import suite_options
+from benchmarks.cli.suite_arguments import stored_results, suite_options
 from benchmarks.runner.export import WRITERS
-from benchmarks.runner.results import stored_results
 from fusion import ParameterError
 
 

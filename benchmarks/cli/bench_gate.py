@@ -8,9 +8,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.cli.bench_plan import opened
-from benchmarks.cli.suite_arguments import suite_options
-from benchmarks.metrics.catalogue import MORE_IS_BETTER
+from benchmarks.cli.suite_arguments import opened, suite_options
+from benchmarks.metrics.catalogue import more_is_better
 from benchmarks.runner.gate import (
     GRAVEST_FIRST,
     Finding,
@@ -58,7 +57,7 @@ def _findings(arguments: argparse.Namespace) -> list[Finding]:
     named = arguments.baseline or (suite.folder / suite.gate.baseline if suite.gate.baseline else None)
     for metric in {*suite.gate.ratio, *suite.gate.floor, *suite.gate.inside}:
         require_metric(metric, results)
-    for metric in filter(MORE_IS_BETTER.fullmatch, suite.gate.ratio):
+    for metric in filter(more_is_better, suite.gate.ratio):
         raise SuiteError(f"gate.ratio.{metric}: more of it is better, so it may grow as it likes; give it a floor")
     found = judge(results, suite.gate, read_baseline(named) if named else None)
     if suite.gate.ratio and named is None:

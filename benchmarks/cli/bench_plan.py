@@ -6,19 +6,9 @@ import argparse
 import json
 import sys
 
-from benchmarks.cli.suite_arguments import suite_options
+from benchmarks.cli.suite_arguments import opened, suite_options
 from benchmarks.runner.plan import cells_of, missing
 from benchmarks.runner.preflight import refuse_impossible
-from benchmarks.runner.store import Store
-from benchmarks.runner.suite import Suite, load_suite
-
-
-def opened(arguments: argparse.Namespace) -> tuple[Suite, Store]:
-    """The suite and the store of `suite_options`; what is left out of the suite is reported on stderr."""
-    suite = load_suite(arguments.suite)
-    for sentence in suite.left_out:
-        sys.stderr.write(f"fusion bench: {sentence}\n")
-    return suite, Store(arguments.store)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -6,8 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.cli.bench_plan import opened
-from benchmarks.cli.suite_arguments import suite_options
+from benchmarks.cli.suite_arguments import opened, suite_options
 from benchmarks.runner.replay_log import one_cell, replay_cell
 from benchmarks.runner.suite import CLEAN
 from benchmarks.runner.verify import NOT_DETERMINISTIC

@@ -6,12 +6,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.cli.suite_arguments import suite_options
+from benchmarks.cli.suite_arguments import stored_results, suite_options
 from benchmarks.metrics.catalogue import RANKED_BY, require_lower_is_better
 from benchmarks.report.figure_panel import without_targets
 from benchmarks.report.report import as_page, report
 from benchmarks.report.report_data import ReportData
-from benchmarks.runner.results import require_metric, stored_results
+from benchmarks.runner.results import require_metric
 from benchmarks.runner.store import Store
 from fusion.output.figures import require_matplotlib
 from fusion.output.files import write

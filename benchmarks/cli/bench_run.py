@@ -7,12 +7,11 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 
-from benchmarks.cell import ALIVE
-from benchmarks.cli.bench_plan import opened
-from benchmarks.cli.suite_arguments import suite_options
-from benchmarks.runner.leaderboard import leaderboard, partly_headed
-from benchmarks.runner.results import Result, warnings
+from benchmarks.cli.suite_arguments import opened, suite_options
+from benchmarks.runner.leaderboard import suite_leaderboard
+from benchmarks.runner.results import Result, partly_headed, warnings
 from benchmarks.runner.run_suite import run_suite
+from benchmarks.runner.scoring import ALIVE
 from benchmarks.runner.suite import CLEAN
 from fusion.cli.arguments import at_least_one
 from fusion.output.progress import progress_bar
@@ -35,8 +34,8 @@ def _first(reasons: Sequence[str]) -> str:
 
 def remarks(results: Sequence[Result]) -> list[str]:
     """Where the truth of a run has a heading at some instants only, one sentence for each run."""
-    told = [(one.cell.run.id, partly_headed(one.metrics)) for one in results if one.cell.fault.id == CLEAN]
-    return [f"{run}: {sentence}" for run, sentence in dict(told).items() if sentence]
+    sentences = {one.run: partly_headed(one) for one in results if one.cell.fault.id == CLEAN}
+    return [f"{run}: {sentence}" for run, sentence in sentences.items() if sentence]
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -69,5 +68,5 @@ def run(arguments: argparse.Namespace) -> int:
     )
     for reason in (*warnings(results), *lost(results), *remarks(results)):
         sys.stderr.write(f"fusion bench run: {reason}\n")
-    print_sheets([leaderboard(results)])
+    print_sheets([suite_leaderboard(results)])
     return 0 if any(result.status in ALIVE for result in results) else 1

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import IO
 
 from benchmarks.metrics.alignment import ALIGNMENTS
-from benchmarks.metrics.catalogue import Column, as_text
+from benchmarks.metrics.catalogue import Column, column
+from benchmarks.metrics.relative_pose import REACHES
 from benchmarks.metrics.track_pair import MODES, PairScore, score_pair
 from fusion.output.files import write_json
 from fusion.output.tables import Sheet, print_sheets
-from logs.truth import DISTANCES_M, DURATIONS_S
 
 
 def print_score(score: PairScore, file: IO[str] | None = None) -> None:
@@ -44,51 +44,56 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-DEGREES = math.degrees(1.0)
-POSITION = (
-    Column("pos_rmse", "RMSE, cm", 100.0, 2),
-    Column("pos_mean", "mean, cm", 100.0, 2),
-    Column("pos_std", "standard deviation, cm", 100.0, 2),
-    Column("pos_min", "min, cm", 100.0, 2),
-    Column("pos_p50", "median, cm", 100.0, 2),
-    Column("pos_p75", "p75, cm", 100.0, 2),
-    Column("pos_p90", "p90, cm", 100.0, 2),
-    Column("pos_p95", "p95, cm", 100.0, 2),
-    Column("pos_p99", "p99, cm", 100.0, 2),
-    Column("pos_max", "max, cm", 100.0, 2),
-    Column("abs_x_mean", "mean of |x error|, cm", 100.0, 2),
-    Column("abs_y_mean", "mean of |y error|, cm", 100.0, 2),
-    Column("bias_x", "bias in x, cm", 100.0, 2),
-    Column("bias_y", "bias in y, cm", 100.0, 2),
-    Column("drms", "DRMS about the bias, cm", 100.0, 2),
-    Column("along_rmse", "RMSE along the way, cm", 100.0, 2),
-    Column("cross_rmse", "RMSE across the way, cm", 100.0, 2),
-    Column("head_mae", "heading, mean, °", DEGREES, 3),
-    Column("head_rmse", "heading, RMSE, °", DEGREES, 3),
-    Column("head_p95", "heading, p95, °", DEGREES, 3),
-    Column("vel_err", "velocity error, mean, m/s", 1.0, 3),
-    Column("jump_rate", "jumps per minute", 1.0, 2),
-    Column("path_ratio", "path length over the true one", 1.0, 4),
+POSITION = tuple(
+    column(metric, title, decimals=decimals, separator=", ")
+    for metric, title, decimals in (
+        ("pos_rmse", "RMSE", 2),
+        ("pos_mean", "mean", 2),
+        ("pos_std", "standard deviation", 2),
+        ("pos_min", "min", 2),
+        ("pos_p50", "median", 2),
+        ("pos_p75", "p75", 2),
+        ("pos_p90", "p90", 2),
+        ("pos_p95", "p95", 2),
+        ("pos_p99", "p99", 2),
+        ("pos_max", "max", 2),
+        ("abs_x_mean", "mean of |x error|", 2),
+        ("abs_y_mean", "mean of |y error|", 2),
+        ("bias_x", "bias in x", 2),
+        ("bias_y", "bias in y", 2),
+        ("drms", "DRMS about the bias", 2),
+        ("along_rmse", "RMSE along the way", 2),
+        ("cross_rmse", "RMSE across the way", 2),
+        ("head_mae", "heading, mean", 3),
+        ("head_rmse", "heading, RMSE", 3),
+        ("head_p95", "heading, p95", 3),
+        ("vel_err", "velocity error, mean", 1),
+        ("jump_rate", "jumps", 2),
+        ("path_ratio", "path length over the true one", 4),
+    )
 )
-QUALITY = (
-    Column("n_valid", "poses compared", 1.0, 0),
-    Column("head_n", "instants with a true heading", 1.0, 0),
-    Column("availability", "availability, %", 100.0, 1),
-    Column("age_p95", "age, p95, s", 1.0, 3),
-    Column("dropout_s", "without an answer, s", 1.0, 1),
-    Column("t_conv", "to convergence, s", 1.0, 1),
-    Column("failures", "failures", 1.0, 0),
-    Column("anees", "ANEES (1: honest)", 1.0, 2),
-    Column("cover95", "inside the claimed 95 %, %", 100.0, 1),
-    Column("nll_2d", "negative log-likelihood, position, nat", 1.0, 3),
-    Column("energy", "energy score, cm", 100.0, 2),
+QUALITY = tuple(
+    column(metric, title, separator=", ")
+    for metric, title in (
+        ("n_valid", "poses compared"),
+        ("head_n", "instants with a true heading"),
+        ("availability", "availability"),
+        ("age_p95", "age, p95"),
+        ("dropout_s", "without an answer"),
+        ("t_conv", "to convergence"),
+        ("failures", "failures"),
+        ("anees", "ANEES (1: honest)"),
+        ("cover95", "inside the claimed 95 %"),
+        ("nll_2d", "negative log-likelihood, position"),
+        ("energy", "energy score"),
+    )
 )
 RELATIVE = (
-    Column("n", "pairs", 1.0, 0),
-    Column("rmse", "RMSE, cm", 100.0, 2),
-    Column("median", "median, cm", 100.0, 2),
-    Column("rot_rmse", "rotation RMSE, °", DEGREES, 3),
-    Column("rot_median", "rotation median, °", DEGREES, 3),
+    ("n", "pairs", 0),
+    ("rmse", "RMSE", 2),
+    ("median", "median", 2),
+    ("rot_rmse", "rotation RMSE", 3),
+    ("rot_median", "rotation median", 3),
 )
 
 
@@ -100,7 +105,7 @@ def sheets(score: PairScore) -> Sequence[Sheet]:
 def _absolute(score: PairScore) -> Sheet:
     if score.aligned is None or score.map_from_estimate is None:
         note = "" if score.align == "none" else f", not alignable by {score.align}"
-        rows = tuple((column.title, as_text(column, score.metrics)) for column in POSITION)
+        rows = tuple((one.title, one.text(score.metrics)) for one in POSITION)
         return Sheet(f"{_title(score)}, raw{note}", ("error", "raw"), rows)
     x, y, yaw = score.map_from_estimate
     title = (
@@ -108,7 +113,7 @@ def _absolute(score: PairScore) -> Sheet:
         f"and moves it by ({x:.4f}, {y:.4f}) m: RMSE raw / aligned = {score.ratio:.2f}"
     )
     both = (score.metrics, score.aligned)
-    return Sheet(title, ("error", "raw", "aligned"), tuple((c.title, *(as_text(c, v) for v in both)) for c in POSITION))
+    return Sheet(title, ("error", "raw", "aligned"), tuple((c.title, *(c.text(v) for v in both)) for c in POSITION))
 
 
 def _title(score: PairScore) -> str:
@@ -116,14 +121,15 @@ def _title(score: PairScore) -> str:
 
 
 def _relative(metrics: dict[str, float]) -> Sheet:
-    reaches = [f"d_{reach}m" for reach in DISTANCES_M] + [f"t_{reach}s" for reach in DURATIONS_S]
-    rows = [
-        (reach[2:], *(as_text(column._replace(key=f"rpe_{reach}_{column.key}"), metrics) for column in RELATIVE))
-        for reach in reaches
-    ]
-    return Sheet("relative pose error after", ("reach", *(column.title for column in RELATIVE)), tuple(rows))
+    rows = [_reach(reach) for reach in REACHES]
+    texts = tuple((reach[2:], *(one.text(metrics) for one in row)) for reach, row in zip(REACHES, rows, strict=True))
+    return Sheet("relative pose error after", ("reach", *(one.title for one in rows[0])), texts)
+
+
+def _reach(reach: str) -> list[Column]:
+    return [column(f"rpe_{reach}_{what}", title, decimals=n, separator=", ") for what, title, n in RELATIVE]
 
 
 def _quality(score: PairScore) -> Sheet:
-    rows = tuple((column.title, as_text(column, score.metrics)) for column in QUALITY)
+    rows = tuple((one.title, one.text(score.metrics)) for one in QUALITY)
     return Sheet("how far to trust this", ("what", "value"), rows)

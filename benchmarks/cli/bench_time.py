@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from benchmarks.cli.bench_plan import opened
-from benchmarks.cli.suite_arguments import suite_options
+from benchmarks.cli.suite_arguments import opened, suite_options
 from benchmarks.runner.timing import REPEATS, TIMING_FILE, Timing, Untimed, machine, measure
 from fusion.cli.arguments import at_least_one
 from fusion.output.files import write_json

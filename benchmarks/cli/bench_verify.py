@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from benchmarks.cli.bench_plan import opened
-from benchmarks.cli.suite_arguments import suite_options
+from benchmarks.cli.suite_arguments import opened, suite_options
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.verify import NOT_DETERMINISTIC, NOT_MEASURED, _is_pure, differing
 from benchmarks.runner.workers import Limits

@@ -12,24 +12,23 @@ from pathlib import Path
 from typing import NamedTuple
 
 import fusion
-from benchmarks.cell import Score
 from benchmarks.report.report import as_page
 from benchmarks.report.report_data import ReportData
-from benchmarks.review.folding import fold
+from benchmarks.review.folding import Reviewed, fold
 from benchmarks.review.picture import render
 from benchmarks.review.plain_picture import draw_plainly
 from benchmarks.review.reviewed_run import own_log
 from benchmarks.review.scene import write_scene
 from benchmarks.review.window import has_display, open_viewer
-from benchmarks.runner.adhoc_suite import bench, pooled, remarks, write_records
-from benchmarks.runner.estimator_run import EstimatorRun
-from benchmarks.runner.leaderboard import print_tables
+from benchmarks.runner.adhoc_suite import bench, remarks, tables, write_records
+from benchmarks.runner.results import Result
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
 from benchmarks.runner.suite import load_suite
 from fusion import FusionError, ViewerError
 from fusion.cli.arguments import not_negative
 from fusion.output.files import write
+from fusion.output.tables import print_sheets
 from fusion.plugins import left_out
 from logs.run import Run
 from sensors.simulation.simulate import simulate
@@ -53,7 +52,7 @@ class Demo(NamedTuple):
 
     log: Path
     records: Path
-    scores: list[Score]
+    results: list[Result]
     drawn: Drawn
     suite: Path
     page: Path | None
@@ -78,32 +77,30 @@ def demo(
     folder.mkdir(parents=True, exist_ok=True)
     log = simulate(SCENARIO, folder / "run.mcap", seed=seed, duration_s=duration_s)
     _tell("running every estimator on the same record")
-    scores = bench([log], seed=seed, workers=workers)
-    for remark in (*left_out(), *remarks(scores)):
+    results = bench([log], seed=seed, workers=workers)
+    for remark in (*left_out(), *remarks(results)):
         _tell(remark)
     records = folder / "scores.json"
-    write_records(scores, records)
+    write_records(results, records)
     drawn = _draw(own_log(log), folder, seed)
-    return Demo(log, records, scores, drawn, suite, _report(suite, folder, workers))
+    return Demo(log, records, results, drawn, suite, _report(suite, folder, workers))
 
 
 def _draw(run: Run, folder: Path, seed: int) -> Drawn:
     """The review and its picture; the scores of the demo do not depend on them."""
     _tell("drawing the review")
-    estimator_runs, scores = fold(run, {name: {} for name in fusion.available()}, seed)
+    reviewed = fold(run, {name: {} for name in fusion.available()}, seed)
     scene, picture = None, folder / "review.png"
     try:
-        (scene,) = write_scene(folder / "review.rrd", run, estimator_runs, scores)
+        (scene,) = write_scene(folder / "review.rrd", run, reviewed)
         return Drawn(scene, render([scene], picture), rendered=True)
     except ViewerError as error:
-        return Drawn(scene, _draw_instead(run, estimator_runs, scores, picture, error), rendered=False)
+        return Drawn(scene, _draw_instead(run, reviewed, picture, error), rendered=False)
 
 
-def _draw_instead(
-    run: Run, estimator_runs: Sequence[EstimatorRun], scores: Sequence[Score], picture: Path, why: ViewerError
-) -> Path | None:
+def _draw_instead(run: Run, reviewed: Sequence[Reviewed], picture: Path, why: ViewerError) -> Path | None:
     try:
-        draw_plainly(run, estimator_runs, scores, picture)
+        draw_plainly(run, reviewed, picture)
     except FusionError as error:
         _tell(f"no picture: {why}; {error}")
         return None
@@ -139,14 +136,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Make the demo, print its table, show it, and say what to try next. Exit code 1 when no estimator survived."""
     made = demo(arguments.output, seed=arguments.seed)
-    print_tables(made.scores, pooled(made.scores))
+    print_sheets(tables(made.results))
     for path in (made.log, made.records, made.drawn.scene, made.drawn.picture, made.page):
         if path is not None:
             sys.stdout.write(f"{path}\n")
     window = has_display() and (made.drawn.rendered if arguments.no_view else _show(made.drawn.scene))
     sys.stdout.write("\nTry next:\n")
     sys.stdout.writelines(f"  {command}\n" for command in next_commands(made, window=window))
-    return 1 if all(score.status == "crashed" for score in made.scores) else 0
+    return 1 if all(result.status == "crashed" for result in made.results) else 0
 
 
 def _show(scene: Path | None) -> bool:

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import fusion
-from benchmarks.cell import cached_run
 from benchmarks.runner.estimator_run import EstimatorRun, run_estimator
 from benchmarks.runner.replay_log import write_replay
+from benchmarks.runner.run_source import open_log
 from fusion import LogError, ParameterError, PluginError
 from fusion.cli.arguments import not_negative
 from fusion.cli.options import parse_options
@@ -35,7 +35,7 @@ def replay(
     """
     if output is not None and output.resolve() == run.resolve():
         raise LogError(f"{output}: this is the log being replayed; give the output another name")
-    recorded = cached_run(run)
+    recorded = open_log(run)
     fusion.build(estimator, recorded.world, options)
     made = run_estimator(recorded, estimator, options, seed)
     if made.error is not None:
@@ -86,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
         seed=arguments.seed,
         verify=arguments.verify,
     )
-    for warning in cached_run(arguments.run).warnings:
+    for warning in open_log(arguments.run).warnings:
         sys.stderr.write(f"fusion replay: {warning}\n")
     sys.stdout.write(f"{digest}\n")
     return 0

@@ -1,11 +1,15 @@
-"""Arguments that the verbs of suites share."""
+"""Arguments that the verbs of suites share, and what they name."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
-from benchmarks.runner.store import STORE
+from benchmarks.runner.plan import cells_of
+from benchmarks.runner.results import Result, read_results, refuse_incomplete
+from benchmarks.runner.store import STORE, Store
+from benchmarks.runner.suite import Suite, load_suite
 
 
 def suite_options(parser: argparse.ArgumentParser) -> None:
@@ -17,3 +21,21 @@ def suite_options(parser: argparse.ArgumentParser) -> None:
         help="a suite file (TOML), or a built-in suite by name: quick, synthetic, paper, real",
     )
     parser.add_argument("--store", type=Path, default=STORE, metavar="FOLDER", help="where results are (%(default)s)")
+
+
+def opened(arguments: argparse.Namespace) -> tuple[Suite, Store]:
+    """The suite and the store of `suite_options`; what is left out of the suite is reported on stderr."""
+    suite = load_suite(arguments.suite)
+    for sentence in suite.left_out:
+        sys.stderr.write(f"fusion bench: {sentence}\n")
+    return suite, Store(arguments.store)
+
+
+def stored_results(arguments: argparse.Namespace) -> tuple[Suite, list[Result]]:
+    """The suite and its results; raises `SuiteError` while some are missing."""
+    suite, store = opened(arguments)
+    cells = cells_of(suite, store)
+    results = read_results(cells, store)
+    if len(results) < len(cells):
+        refuse_incomplete(suite, len(results), len(cells))
+    return suite, results

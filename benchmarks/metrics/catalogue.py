@@ -1,91 +1,92 @@
-"""Units, directions and titles of metrics."""
+"""Catalogue of metrics: id, unit, direction, title and needs of every number of a score, as tables and docs show it."""
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Mapping
+from itertools import groupby
 from typing import NamedTuple
 
+from benchmarks.metrics import consistency, convergence, drift, innovations, intervals, position, relative_pose
+from benchmarks.metrics.metric import Better, Metric, Unit
 from fusion import ParameterError
+
+COST = Metric("cpu_per_measurement_s", "s/measurement", Better.LESS, "processor time per measurement", "none")
+METRICS: Mapping[str, Metric] = {
+    metric.id: metric
+    for table in (
+        position.METRICS,
+        intervals.METRICS,
+        relative_pose.METRICS,
+        drift.METRICS,
+        consistency.METRICS,
+        convergence.METRICS,
+        innovations.METRICS,
+        (COST,),
+    )
+    for metric in table
+}
+"""Every metric by id, in the order of the documentation."""
+RANKED_BY = "pos_p75"
 
 
 class Column(NamedTuple):
-    """One number of a score: its key in the record, and how a person wants it."""
+    """One column of a table: a metric, and a short title."""
 
     key: str
     title: str
-    factor: float
-    decimals: int
+    unit: Unit
 
-
-COLUMNS = (
-    Column("pos_rmse", "RMSE\ncm", 100.0, 1),
-    Column("pos_mean", "mean\ncm", 100.0, 1),
-    Column("pos_p50", "median\ncm", 100.0, 1),
-    Column("pos_p75", "p75\ncm", 100.0, 1),
-    Column("pos_p95", "p95\ncm", 100.0, 1),
-    Column("pos_max", "max\ncm", 100.0, 1),
-    Column("head_rmse", "heading\nRMSE °", math.degrees(1.0), 2),
-    Column("anees", "ANEES", 1.0, 2),
-    Column("availability", "avail.\n%", 100.0, 1),
-    Column("cpu_per_measurement_s", "time\nµs/msg", 1e6, 0),
-)
-
-
-LENGTHS = ("pos_", "abs_", "along_", "cross_", "bias_", "drms", "2drms", "max_in_outage", "energy")
-"""How the ids of metrics in metres begin."""
-
-
-class Unit(NamedTuple):
-    """How people want a metric: what to multiply it by, and the unit it is in then."""
-
-    factor: float
-    name: str
-
-    def number(self, value: float) -> str:
-        """A value of the metric, without the unit; – where there is none."""
-        if math.isnan(value):
-            return "–"
-        return "∞" if math.isinf(value) else f"{value * self.factor:.{1 if self.name else 2}f}"
+    def text(self, values: Mapping[str, object]) -> str:
+        """The number as people read it: – where there is none."""
+        return self.unit.number(values.get(self.key))
 
 
 def unit_of(metric: str) -> Unit:
-    """Centimetres for lengths, degrees for headings; other metrics as they are.
+    """The unit in which people read a metric; of one that is not in the catalogue, that of a plain number.
 
     >>> unit_of("pos_p75").number(0.123), unit_of("anees").number(1.234), unit_of("head_n").name
     ('12.3', '1.23', '')
     """
-    if metric.startswith(LENGTHS) and metric != "pos_auc":
-        return Unit(100.0, "cm")
-    if metric.startswith("head_") and metric != "head_n":
-        return Unit(math.degrees(1.0), "°")
-    return Unit(1.0, "")
+    return METRICS[metric].unit if metric in METRICS else Unit("", 1.0, 2)
 
 
-def as_text(column: Column, values: Mapping[str, object]) -> str:
-    """A number as people read it: – where there is none."""
-    value = values.get(column.key)
-    if not isinstance(value, float) or math.isnan(value):
-        return "–"
-    return "∞" if math.isinf(value) else f"{value * column.factor:.{column.decimals}f}"
+def column(metric: str, title: str, *, decimals: int | None = None, separator: str = "\n") -> Column:
+    """The column of a metric, its unit under the title, or behind another ``separator``."""
+    unit = unit_of(metric)
+    shown = unit if decimals is None else unit._replace(decimals=decimals)
+    return Column(metric, f"{title}{separator}{unit.name}" if unit.name else title, shown)
 
 
-RANKED_BY = "pos_p75"
-
-
-MORE_IS_BETTER = re.compile(
-    r"n|n_valid|head_n|.*n_eff|.*availability|cover.*|pos_auc|pos_cdf_.*|t_conv_share|nis95_.*|white_.*|rpe_.*_n"
+COLUMNS = (
+    column("pos_rmse", "RMSE"),
+    column("pos_mean", "mean"),
+    column("pos_p50", "median"),
+    column("pos_p75", "p75"),
+    column("pos_p95", "p95"),
+    column("pos_max", "max"),
+    column("head_rmse", "heading\nRMSE", separator=" "),
+    column("anees", "ANEES"),
+    column("availability", "avail."),
 )
 
 
-NEITHER_IS_BETTER = re.compile(r"anees.*|nll_.*|.*bias.*|cov_.*|path_ratio|eag|.*growth")
-"""Their best is 1 or 0, or they may be negative and so have no ratio."""
+def more_is_better(metric: str) -> bool:
+    """Whether the catalogue has the metric, and its greater values are better."""
+    return metric in METRICS and METRICS[metric].better is Better.MORE
 
 
 def require_lower_is_better(metric: str) -> None:
     """Raises `ParameterError` for a metric of which more is better, or a certain value: that the lower wins would be
     the wrong verdict.
     """
-    if MORE_IS_BETTER.fullmatch(metric) or NEITHER_IS_BETTER.fullmatch(metric):
+    if metric in METRICS and METRICS[metric].better is not Better.LESS:
         raise ParameterError(f"a lower {metric} is not better, so it decides nothing here; {RANKED_BY} is usual")
+
+
+def as_table() -> str:
+    """The catalogue as a Markdown table: metrics that differ by their ids alone share a row."""
+    lines = ["| Metric | Unit | Better | What it is | Needs |", "|---|---|---|---|---|"]
+    for (unit, better, title, needs), group in groupby(METRICS.values(), key=lambda one: one[1:]):
+        ids = ", ".join(f"`{one.id}`" for one in group)
+        lines.append(f"| {ids} | {unit} | {better.value} | {title} | {needs} |")
+    return "\n".join(lines) + "\n"

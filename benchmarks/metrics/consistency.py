@@ -8,11 +8,22 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.metrics.errors import Errors
+from benchmarks.metrics.metric import Better, rows
 from fusion.arrays import Flags, Floats, Whole
 from fusion.quantiles import known, mean
 
 CHI_SQUARE_95 = {1: 3.841458820694124, 2: 5.991464547107979, 3: 7.814727903251179}
 """Values a chi-square variable of 1, 2 and 3 degrees of freedom exceeds once in twenty."""
+CLAIM = "covariance"
+METRICS = (
+    *rows("anees anees_2d", "1", Better.NEITHER, "ANEES of pose and position: 1 is honest, more is too certain", CLAIM),
+    *rows("cover95 cover95_2d", "share", Better.NEITHER, "share of errors inside the claimed 95 % region", CLAIM),
+    *rows(
+        "nll_3d nll_2d", "nat", Better.LESS, "negative log-likelihood of pose and position: accuracy and honesty", CLAIM
+    ),
+    *rows("energy", "m", Better.LESS, "energy score of the position: accuracy and honesty", CLAIM),
+)
+"""Of the functions below."""
 
 
 class Claimed(NamedTuple):

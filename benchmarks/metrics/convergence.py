@@ -14,6 +14,7 @@ import numpy as np
 
 from benchmarks.metrics.drift import theil_sen
 from benchmarks.metrics.errors import Errors
+from benchmarks.metrics.metric import Better, rows
 from fusion.arrays import Flags, Whole
 from fusion.quantiles import mean, quantile
 from fusion.values import NANOSECONDS, nanoseconds
@@ -25,6 +26,28 @@ FAILED_M, FAILED_S = 3.0, 2.0
 CELL_M = 1.0
 COVERED = 0.95
 """A cell of the floor is covered when this share of its instants has a valid answer."""
+FAULT = "fault with windows"
+METRICS = (
+    *rows("t_conv", "s", Better.LESS, "time until the error stays below 1 m for 5 s"),
+    *rows("t_conv_share", "share", Better.MORE, "share of runs in which it does"),
+    *rows("failures", "count", Better.LESS, "times that the error exceeds 3 m, or is missing, for 2 s"),
+    *rows("t_recover", "s", Better.LESS, "of the worst of these, time until converged again"),
+    *rows("max_in_outage", "m", Better.LESS, "of the worst of these, greatest error"),
+    *rows("growth", "m/s", Better.LESS, "of the worst of these, slope of the error"),
+    *rows("age_p95", "s", Better.LESS, "age of the newest estimate, 95 % quantile"),
+    *rows("dropouts", "count", Better.LESS, "stretches without a valid estimate"),
+    *rows("dropout_s", "s", Better.LESS, "time that all of these last"),
+    *rows(
+        "coverage", "share", Better.MORE, "share of the visited square metres where 95 % of instants have an estimate"
+    ),
+    *rows("fault_availability", "share", Better.MORE, "share of the instants of a fault with an estimate", FAULT),
+    *rows(
+        "fault_t_recover", "s", Better.LESS, "from the end of a fault until the error stays below 1 m for 5 s", FAULT
+    ),
+    *rows("fault_max_in_outage", "m", Better.LESS, "greatest error during a fault", FAULT),
+    *rows("fault_growth", "m/s", Better.LESS, "slope of the error during a fault", FAULT),
+)
+"""Of the functions below; those of faults are the worst over their windows."""
 
 
 class Stretches(NamedTuple):

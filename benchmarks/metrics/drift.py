@@ -7,12 +7,17 @@ from functools import lru_cache
 import numpy as np
 
 from benchmarks.metrics.errors import Errors
+from benchmarks.metrics.metric import Better, rows
 from fusion.arrays import Floats, Whole
 from fusion.quantiles import quantile
 
 MOST_PAIRS = 3000
 """Slopes that a median is taken of. Of more pairs than these every k-th is used: the median then strays a tenth more
 than that of all would."""
+METRICS = rows(
+    "eag", "m/s", Better.LESS, "slope of the error over the time since the last radio fix used", "used fixes"
+)
+"""Of the function below."""
 
 
 def drift_metrics(measured: Errors) -> dict[str, float]:

@@ -76,12 +76,6 @@ class FateColumns(NamedTuple):
         found = np.bincount(self.decision, minlength=len(DECISIONS))
         return {decision.value: int(count) for decision, count in zip(DECISIONS, found, strict=True)}
 
-    @property
-    def nis_mean(self) -> float | None:
-        """Over all readings that have one; None where there are none, or not all are finite."""
-        known = self.nis[~np.isnan(self.nis)]
-        return float(known.mean()) if len(known) and np.isfinite(known).all() else None
-
 
 def fates_of(updates: Sequence[Update]) -> list[Fate]:
     """The fates behind the rows of `FateColumns`."""

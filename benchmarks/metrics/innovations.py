@@ -12,6 +12,7 @@ from benchmarks.metrics.consistency import CHI_SQUARE_95
 from benchmarks.metrics.effective_samples import effective_sizes, mean_chi_square_band
 from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.intervals import CEILING
+from benchmarks.metrics.metric import Better, rows
 from fusion.arrays import Floats
 from fusion.quantiles import mean
 
@@ -19,6 +20,20 @@ NAMES = ("wifi", "ranges", "gyro", "ticks", "command", "odom")
 """Of `benchmarks.metrics.fates.KINDS`."""
 LAGS = 10
 """Of the Ljung-Box test; a series of fewer than five times as many values is tested up to a fifth of its length."""
+READINGS = "predicted readings"
+
+
+def _each(ids: str) -> str:
+    return " ".join(ids.replace("{}", name) for name in NAMES)
+
+
+METRICS = (
+    *rows(_each("nis_{}"), "1", Better.NEITHER, "mean NIS of the readings: 1 is honest, more is too certain", READINGS),
+    *rows(_each("nis_{}_low nis_{}_high"), "1", Better.NEITHER, "band of an honest filter's mean NIS, 95 %", READINGS),
+    *rows(_each("nis95_{}"), "share", Better.NEITHER, "share of readings inside 95 % of their variance", READINGS),
+    *rows(_each("white_{}"), "1", Better.MORE, "p-value of their whiteness (Ljung & Box)", READINGS),
+)
+"""Of the functions below."""
 
 
 def innovation_metrics(fates: FateColumns) -> dict[str, float]:

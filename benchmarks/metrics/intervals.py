@@ -9,9 +9,10 @@ import math
 
 import numpy as np
 
-from benchmarks.metrics.consistency import Claimed
+from benchmarks.metrics.consistency import CLAIM, Claimed
 from benchmarks.metrics.effective_samples import binomial_interval, effective_sizes, mean_chi_square_band, order_shares
 from benchmarks.metrics.errors import Errors
+from benchmarks.metrics.metric import Better, rows
 from benchmarks.metrics.position import AUC_RADIUS_M, POSITION_QUANTILES
 from fusion.arrays import Floats
 from fusion.quantiles import Ordered, mean
@@ -25,6 +26,22 @@ LEADERS = np.array([*(0,) * QUANTILE_ROWS, *(QUANTILE_ROWS,) * 2])
 UNKNOWN_BANDS = dict.fromkeys(
     ("anees_n_eff", "anees_band_low", "anees_band_high", "cover95_n_eff", "cover95_low", "cover95_high"), math.nan
 )
+
+METRICS = (
+    *rows(
+        "n_eff", "count", Better.MORE, "independent instants that the instants are worth, by the error's correlation"
+    ),
+    *rows(
+        " ".join(f"{name}_{end}" for name in POSITION_QUANTILES for end in ("low", "high")),
+        "m",
+        Better.LESS,
+        "95 % interval of that quantile, by as many independent instants",
+    ),
+    *rows("anees_n_eff cover95_n_eff", "count", Better.MORE, "independent instants behind `anees`, `cover95`", CLAIM),
+    *rows("anees_band_low anees_band_high", "1", Better.NEITHER, "band of an honest filter's ANEES, 95 %", CLAIM),
+    *rows("cover95_low cover95_high", "share", Better.NEITHER, "95 % interval of `cover95`", CLAIM),
+)
+"""Of the functions below."""
 
 
 def interval_metrics(measured: Errors, ordered: Ordered, claimed: Claimed) -> dict[str, float]:

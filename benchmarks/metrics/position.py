@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from benchmarks.metrics.errors import Errors
+from benchmarks.metrics.metric import Better, rows
 from fusion.arrays import Flags, Floats, points
 from fusion.quantiles import Ordered, mean, means, quantile, quantiles, root_mean_square, root_mean_squares
 
@@ -19,6 +20,36 @@ POSITION_QUANTILES = {"pos_p50": 0.50, "pos_p75": 0.75, "pos_p90": 0.90, "pos_p9
 CDF_RADII_M = {"10cm": 0.1, "30cm": 0.3, "50cm": 0.5, "1m": 1.0, "2m": 2.0, "3m": 3.0}
 """By the ends of their ids."""
 RADII_M = np.array([*CDF_RADII_M.values()])
+
+METRICS = (
+    *rows("n", "count", Better.MORE, "evaluation instants"),
+    *rows("n_valid", "count", Better.MORE, "instants with a valid estimate"),
+    *rows("availability", "share", Better.MORE, "share of instants with a valid estimate", "none"),
+    *rows("pos_mean pos_rmse pos_std pos_min pos_max", "m", Better.LESS, "position error over valid instants"),
+    *rows(" ".join(POSITION_QUANTILES), "m", Better.LESS, "quantile of the position error over all instants"),
+    *rows(
+        " ".join(f"pos_cdf_{name}" for name in CDF_RADII_M),
+        "share",
+        Better.MORE,
+        "share of all instants with a position error within that radius",
+    ),
+    *rows("pos_auc", "1", Better.MORE, "area under that distribution function up to 3 m, over 3 m: 1 is perfect"),
+    *rows(
+        "abs_x_mean abs_x_max abs_x_min abs_y_mean abs_y_max abs_y_min",
+        "m",
+        Better.LESS,
+        "absolute error along an axis of the map, as the paper has it; not to be compared with `pos_mean`",
+    ),
+    *rows("bias_x bias_y", "m", Better.NEITHER, "mean of the signed error"),
+    *rows("cov_xx cov_xy cov_yy", "m^2", Better.NEITHER, "covariance of the signed error"),
+    *rows("drms 2drms", "m", Better.LESS, "root of the trace of that covariance, and twice that"),
+    *rows("along_rmse cross_rmse", "m", Better.LESS, "error along and across the true heading", "true heading"),
+    *rows("along_bias cross_bias", "m", Better.NEITHER, "mean of the error along and across it", "true heading"),
+    *rows("along_p95 cross_p95", "m", Better.LESS, "95 % quantile of its size, over all instants", "true heading"),
+    *rows("head_n", "count", Better.MORE, "instants whose true heading is known"),
+    *rows("head_mae head_rmse head_p95", "rad", Better.LESS, "heading error at these", "true heading"),
+)
+"""Of the functions below."""
 
 
 def position_metrics(measured: Errors, ordered: Ordered) -> dict[str, float]:

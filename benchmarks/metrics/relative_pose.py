@@ -8,14 +8,36 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.metrics.errors import Errors
+from benchmarks.metrics.metric import Better, rows
 from fusion.arrays import Floats, Points, Whole, points
 from fusion.quantiles import known, mean, quantile, root_mean_square
 from fusion.values import NANOSECONDS
-from logs.truth import Instants
+from logs.truth import DISTANCES_M, DURATIONS_S, Instants
 
 TOP_SPEED_M_S = 2.0
 """What no indoor robot exceeds, where none is declared."""
 JUMP_M = 0.10
+REACHES = (*(f"d_{reach}m" for reach in DISTANCES_M), *(f"t_{reach}s" for reach in DURATIONS_S))
+METRICS = (
+    *rows(
+        " ".join(f"rpe_{reach}_{what}" for reach in REACHES for what in ("rmse", "median")),
+        "m",
+        Better.LESS,
+        "relative pose error in SE(2), translation, after so much true path, or time",
+    ),
+    *rows(
+        " ".join(f"rpe_{reach}_rot_{what}" for reach in REACHES for what in ("rmse", "median")),
+        "rad",
+        Better.LESS,
+        "its rotation",
+        "true heading",
+    ),
+    *rows(" ".join(f"rpe_{reach}_n" for reach in REACHES), "count", Better.MORE, "pairs of poses behind it"),
+    *rows("vel_err vel_err_p95", "m/s", Better.LESS, "error of the velocity over 1 s, mean and 95 % quantile"),
+    *rows("jump_rate", "1/min", Better.LESS, "jumps that no robot makes, 2 m/s and 10 cm"),
+    *rows("path_ratio", "1", Better.NEITHER, "path of the estimates over the true one"),
+)
+"""Of the functions below."""
 
 
 def trajectory_metrics(measured: Errors, *, top_speed_m_s: float = TOP_SPEED_M_S) -> dict[str, float]:

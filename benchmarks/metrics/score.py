@@ -22,7 +22,7 @@ from benchmarks.metrics.relative_pose import trajectory_metrics
 from fusion.quantiles import Ordered, quantile
 from logs.truth import Instants
 
-METRICS_VERSION = 10
+METRICS_VERSION = 11
 """Changes whenever a metric does, so that stored scores are not taken for current ones."""
 
 __all__ = [

@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.report.cell_links import link, nearest
 from benchmarks.report.report_data import ReportData
-from benchmarks.runner.leaderboard import sheet
+from benchmarks.runner.leaderboard import pair_table
 from benchmarks.runner.results import Result, by_estimator, by_run, score_matrix
 from benchmarks.statistics.paired_tests import log_ratios
 from benchmarks.statistics.verdict import Comparison, Verdict
@@ -33,12 +33,12 @@ def run_by_run(data: ReportData) -> Sheet:
 
 def pairs(data: ReportData, comparison: Comparison) -> Sheet:
     """Every pair as one row; the ratio leads to the cell that decided most."""
-    told = sheet(comparison)
+    table = pair_table(comparison)
     rows = [
         (pair, link(data, ratio, deciding(data, verdict)), *rest)
-        for verdict, (pair, ratio, *rest) in zip(comparison.verdicts, told.rows, strict=True)
+        for verdict, (pair, ratio, *rest) in zip(comparison.verdicts, table.rows, strict=True)
     ]
-    return told._replace(rows=tuple(rows))
+    return table._replace(rows=tuple(rows))
 
 
 def deciding(data: ReportData, verdict: Verdict) -> Result:

@@ -8,16 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.cell import ALIVE
 from benchmarks.limits.fix_bound import Places, Radio, fix_error
-from benchmarks.metrics.catalogue import RANKED_BY, Unit, unit_of
+from benchmarks.metrics.catalogue import RANKED_BY, unit_of
 from benchmarks.metrics.errors import Errors, errors
 from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.matching import Answers, match
+from benchmarks.metrics.metric import Unit
 from benchmarks.review.frame import Frame
 from benchmarks.runner.execute import stored_track
 from benchmarks.runner.results import Result, by_estimator, comparison, judged, median_metrics
 from benchmarks.runner.run_source import open_run
+from benchmarks.runner.scoring import ALIVE
 from benchmarks.runner.store import STORE, Store
 from benchmarks.runner.suite import CLEAN, Suite
 from benchmarks.runner.timing import read_timing
@@ -132,7 +133,7 @@ class ReportData:
     @cached_property
     def scored_runs(self) -> list[str]:
         """The first runs that count and have truth."""
-        known = {result.cell.run.id for result in judged(self.results) if "availability" in result.metrics}
+        known = {result.cell.run.id for result in judged(self.results) if result.has_truth}
         return [run.id for run in self.suite.runs if run.id in known][:SHOWN_RUNS]
 
     @cached_property

@@ -7,32 +7,32 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.cell import ALIVE
 from benchmarks.limits.fix_bound import eff_crlb
 from benchmarks.limits.posterior_bound import eff_pcrlb, posterior_bound
-from benchmarks.metrics.catalogue import COLUMNS, Column, Unit, as_text
+from benchmarks.metrics.catalogue import COLUMNS, column
 from benchmarks.metrics.credibility import credibility_metrics
+from benchmarks.metrics.metric import Unit
 from benchmarks.metrics.score import quantile
 from benchmarks.report.cell_links import link, link_all, nearest, nearest_to
 from benchmarks.report.report_data import ReportData
 from benchmarks.report.worst import command, worst_moments
 from benchmarks.runner.results import Result, by_estimator, by_run, median_metrics, score_matrix
+from benchmarks.runner.scoring import ALIVE
 from benchmarks.runner.suite import CLEAN
 from benchmarks.statistics.paired_tests import mean_interval
 from fusion.arrays import Floats
 from fusion.output.tables import Sheet, as_code
 
 OUTAGE_COLUMNS = (
-    Column("fault_availability", "available inside, %", 100.0, 1),
-    Column("fault_max_in_outage", "greatest error inside, cm", 100.0, 1),
-    Column("fault_growth", "growth inside, cm/s", 100.0, 2),
-    Column("fault_t_recover", "below 1 m again after, s", 1.0, 1),
+    column("fault_availability", "available inside", separator=", "),
+    column("fault_max_in_outage", "greatest error inside", separator=", "),
+    column("fault_growth", "growth inside", separator=", "),
+    column("fault_t_recover", "below 1 m again after", separator=", ", decimals=1),
 )
 
 
 def leaderboard(data: ReportData) -> Sheet:
     """The best first, with the letters that say who cannot be told apart, and the worst run beside the median."""
-    shown = [column for column in COLUMNS if column.key != "cpu_per_measurement_s"]
     grouped, unit = by_estimator(data.results), data.unit
     letters = data.comparison.letters if data.comparison else {}
     rows = []
@@ -45,11 +45,10 @@ def leaderboard(data: ReportData) -> Sheet:
         head = (letters.get(name, "–"), link_all(data, f"{alive}/{len(own)}", name))
         over_runs = link_all(data, _interval(scores, unit), name)
         numbers = (
-            link(data, as_text(column, medians), nearest(own, column.key, medians.get(column.key, math.inf)))
-            for column in shown
+            link(data, one.text(medians), nearest(own, one.key, medians.get(one.key, math.inf))) for one in COLUMNS
         )
         rows.append((name, *head, over_runs, worst, *numbers))
-    titles = (column.title.replace("\n", " ") for column in shown)
+    titles = (one.title.replace("\n", " ") for one in COLUMNS)
     metric = f"{data.metric} {unit.name}".rstrip()
     titled = ("estimator", "alike", "cells ok", f"{metric} over runs [95 %]", f"worst run, {metric}", *titles)
     return Sheet("Leaderboard: medians over cells without faults", titled, tuple(rows))
@@ -93,10 +92,10 @@ def outages(data: ReportData) -> Sheet:
         grouped = by_estimator(data.results, fault.id)
         for name in data.estimators:
             medians = median_metrics(grouped[name])
-            numbers = [as_text(column, medians) for column in OUTAGE_COLUMNS]
+            numbers = [one.text(medians) for one in OUTAGE_COLUMNS]
             if set(numbers) != {"–"}:
                 rows.append((fault.id, name, *numbers, _under(data, name, clean[name], fault.id)))
-    head = ("fault", "estimator", *(column.title for column in OUTAGE_COLUMNS), f"{data.metric} over clean")
+    head = ("fault", "estimator", *(one.title for one in OUTAGE_COLUMNS), f"{data.metric} over clean")
     return Sheet("While a fault lasts: medians over cells, the worst of its windows", head, tuple(rows))
 
 

@@ -69,12 +69,12 @@ def _overview(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa:
 
 def _reception(run: Run, drawn: Sequence[Drawing]) -> tuple[Any, float]:
     """What the radio said and what was made of it, and their height; in front is what has something to tell."""
-    told = [drawing for drawing in drawn if drawing.shown and not drawing.ghost and drawing.states.state]
-    estimator_runs = [state_view(told)] if told else []
+    told = [drawing for drawing in drawn if drawing.shown and not drawing.is_counterfactual and drawing.states.state]
+    state = [state_view(told)] if told else []
     eventful = any(state in (State.REJECT, State.LOST) for drawing in told for state in drawing.states.state)
     if eventful:
-        return tabs(estimator_runs + _radio(run)), max(1.5, 0.6 + 0.28 * len(told))
-    return tabs(_radio(run) + estimator_runs), 1.8
+        return tabs(state + _radio(run)), max(1.5, 0.6 + 0.28 * len(told))
+    return tabs(_radio(run) + state), 1.8
 
 
 def _radio(run: Run) -> list[Any]:
@@ -91,7 +91,7 @@ def _details(drawn: Sequence[Drawing]) -> list[Any]:
     import rerun.blueprint as rrb
 
     details = []
-    for drawing in (drawing for drawing in drawn if not drawing.ghost):
+    for drawing in (drawing for drawing in drawn if not drawing.is_counterfactual):
         name, views = drawing.name, []
         if any(drawing.claims):
             views.append(tabs(_claims(drawing)))
@@ -138,7 +138,7 @@ def _honesty(drawing: Drawing) -> list[Any]:
     if any(drawing.claims):
         title = f"{name}: NEES; 95 % should lie between the lines"
         views.append(plot(title, rr.new_entity_path(["nees", name]), span=upward(_nees_top(drawing)), legend=False))
-    if drawing.estimator_run.clouds is not None:
+    if drawing.reviewed.clouds is not None:
         views.append(plot(f"{name}: effective particles", rr.new_entity_path(["neff", name]), legend=False))
     return views
 

@@ -1,13 +1,12 @@
-"""What if: the same run with something taken out, for estimates that are drawn as ghosts beside the real ones."""
+"""What if: the same run with something taken out, for estimates that are drawn thin beside the real ones."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from benchmarks.review.frame import Frame
-from benchmarks.runner.estimator_run import EstimatorRun, run_estimator
 from fusion import Measurement, ParameterError, Ranges, WifiScan
 from fusion.errors import did_you_mean
 from fusion.values import nanoseconds, seconds
@@ -73,11 +72,3 @@ def require_within(run: Run, at_s: float, option: str) -> None:
         raise ParameterError(
             f"{option} {at_s:g}: {run.path} lasts from 0 to {duration_s:.2f} s; give a time in between"
         )
-
-
-def counterfactual_run(
-    estimator: str, params: Mapping[str, object], counterfactual: Counterfactual, seed: int
-) -> EstimatorRun:
-    """What ``estimator`` would have made of it, named for both."""
-    estimator_run = run_estimator(counterfactual.run, estimator, params, seed)
-    return replace(estimator_run, name=f"{estimator} {counterfactual.suffix}", counterfactual_of=estimator)

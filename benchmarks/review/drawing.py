@@ -9,14 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.cell import Score
+from benchmarks.metrics.catalogue import COST
 from benchmarks.metrics.fates import FateColumns, fates_per_update
 from benchmarks.metrics.matching import Answers, match
 from benchmarks.review.columns import DrawnTrack, EstimateColumns
 from benchmarks.review.events import Events, States, events, states
-from benchmarks.runner.estimator_run import EstimatorRun
-from benchmarks.runner.leaderboard import ranked
-from fusion import Decision, Reason
+from benchmarks.review.folding import Reviewed
+from benchmarks.runner.leaderboard import Entry, rank
+from benchmarks.runner.scoring import Score
+from fusion import Decision, Reason, Update
 from fusion.arrays import Floats, Whole
 from fusion.output.colours import Colour, colour_of
 from logs.run import Run
@@ -46,12 +47,11 @@ def signed_errors(instants: Instants, answers: Answers) -> SignedErrors:
 
 @dataclass(frozen=True)
 class Drawing:
-    """An estimator with its score. ``instants`` and ``answers`` belong together; they are
-    None where there is nothing to compare: no truth, or an estimator that crashed.
+    """An estimator as it is drawn. ``instants`` and ``answers`` belong together; they are None where there is nothing
+    to compare: no truth, or an estimator that crashed.
     """
 
-    estimator_run: EstimatorRun
-    score: Score
+    reviewed: Reviewed
     shown: bool
     instants: Instants | None
     answers: Answers | None
@@ -59,37 +59,47 @@ class Drawing:
     @property
     def name(self) -> str:
         """Its name."""
-        return self.estimator_run.name
+        return self.reviewed.name
 
     @property
-    def ghost(self) -> bool:
+    def score(self) -> Score:
+        """Its score."""
+        return self.reviewed.score
+
+    @property
+    def final(self) -> tuple[Update, ...]:
+        """Its final updates, in time order."""
+        return self.reviewed.made.final
+
+    @property
+    def is_counterfactual(self) -> bool:
         """Whether it shows what would have been, and is drawn thin."""
-        return self.estimator_run.counterfactual_of is not None
+        return self.reviewed.counterfactual_of is not None
 
     @property
     def colour(self) -> Colour:
-        """A ghost has the colour of what it is a ghost of."""
-        return colour_of(self.estimator_run.counterfactual_of or self.estimator_run.name)
+        """A counterfactual has the colour of its estimator."""
+        return colour_of(self.reviewed.counterfactual_of or self.name)
 
     @cached_property
     def track(self) -> DrawnTrack:
         """The path."""
-        return DrawnTrack.of_updates(self.estimator_run.final, self.estimates.valid)
+        return DrawnTrack.of_updates(self.final, self.estimates.valid)
 
     @cached_property
     def estimates(self) -> EstimateColumns:
-        """What it said of itself."""
-        return EstimateColumns.of_updates(self.estimator_run.final)
+        """What it claims of itself."""
+        return EstimateColumns.of_updates(self.final)
 
     @property
     def fates(self) -> FateColumns:
         """What became of the readings."""
-        return self.estimator_run.fates
+        return self.reviewed.made.fates
 
     @cached_property
     def fate_update(self) -> Whole:
-        """The index in ``EstimatorRun.final`` of the update that each of them belongs to, (m,)."""
-        return np.repeat(np.arange(len(self.estimator_run.final)), fates_per_update(self.estimator_run.final))
+        """The index in `Drawing.final` of the update that each of them belongs to, (m,)."""
+        return np.repeat(np.arange(len(self.final)), fates_per_update(self.final))
 
     @cached_property
     def states(self) -> States:
@@ -99,13 +109,13 @@ class Drawing:
     @cached_property
     def events(self) -> Events:
         """What happened to it."""
-        return events(self.estimator_run.final, self.estimates, self.fates)
+        return events(self.final, self.estimates, self.fates)
 
     @cached_property
     def gates(self) -> bool:
-        """Whether it listens to the radio at all, so that there is a weight to show; of a ghost none is shown."""
+        """Whether it uses radio at all, so that there is a weight to show; of a counterfactual none is shown."""
         unheard = self.fates.met(Reason.KIND_NOT_CONSUMED) | self.fates.met(Decision.LATE)  # which may be of anything
-        return not self.ghost and not bool(unheard.all())
+        return not self.is_counterfactual and not bool(unheard.all())
 
     @cached_property
     def tells_nis(self) -> bool:
@@ -123,16 +133,22 @@ class Drawing:
         return [False] * 3 if self.errors is None else [bool(np.isfinite(v).any()) for v in self.errors.variance.T]
 
 
-def drawings(run: Run, estimator_runs: Sequence[EstimatorRun], scores: Sequence[Score]) -> list[Drawing]:
-    """The estimators with their scores, one by one, the best first. A ghost is shown where its estimator is."""
+def drawings(run: Run, reviewed: Sequence[Reviewed]) -> list[Drawing]:
+    """The estimators with their scores, the best first. A counterfactual is shown where its estimator is."""
     instants = None if run.truth is None else evaluation_instants(run.truth)
-    by_name = {estimator_run.name: estimator_run for estimator_run in estimator_runs}
-    ranking = [(by_name[score.estimator], score) for score in ranked(scores)]
-    best = [estimator_run.name for estimator_run, _ in ranking if estimator_run.counterfactual_of is None][:SHOWN]
-    drawn = []
-    for estimator_run, score in ranking:
-        shown = (estimator_run.counterfactual_of or estimator_run.name) in best
-        compared = instants if score.errors is not None and estimator_run.error is None else None
-        answers = None if compared is None else match(compared, estimator_run.track)
-        drawn.append(Drawing(estimator_run, score, shown, compared, answers))
-    return drawn
+    ranking = sorted(reviewed, key=lambda one: rank(entry_of(one)))
+    best = [one.name for one in ranking if one.counterfactual_of is None][:SHOWN]
+    return [_drawing(one, instants, shown=(one.counterfactual_of or one.name) in best) for one in ranking]
+
+
+def _drawing(reviewed: Reviewed, instants: Instants | None, *, shown: bool) -> Drawing:
+    made, scored = reviewed.made, reviewed.score
+    if instants is None or scored.errors is None or made.error is not None:
+        return Drawing(reviewed, shown, None, None)
+    return Drawing(reviewed, shown, instants, match(instants, made.track))
+
+
+def entry_of(reviewed: Reviewed) -> Entry:
+    """The row of an estimator in the table of scores."""
+    cost = {} if reviewed.cost_s is None else {COST.id: reviewed.cost_s}
+    return Entry(reviewed.name, (reviewed.score.status,), {**reviewed.score.metrics, **cost})

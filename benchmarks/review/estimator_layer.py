@@ -20,13 +20,13 @@ CIRCLE_S = 1.0
 """How long a reading is seen: readings this close together count as one view of the anchors."""
 PARTICLE_OPACITY, PARTICLE_PIXELS = (70, 200), (0.75, 2.25)
 """Opacity and radius of a particle without weight, and of the heaviest one of its cloud."""
-GHOST_THICKNESS = 0.5
+COUNTERFACTUAL_THICKNESS = 0.5
 """Of the lines of what would have been, against those of what was."""
 
 
 def thickness(drawing: Drawing) -> float:
     """How thick an estimator is drawn."""
-    return GHOST_THICKNESS if drawing.ghost else 1.0
+    return COUNTERFACTUAL_THICKNESS if drawing.is_counterfactual else 1.0
 
 
 def draw_on_map(canvas: Canvas, world: World, readings: Heard, drawing: Drawing, legend: tuple[float, float]) -> None:
@@ -36,7 +36,7 @@ def draw_on_map(canvas: Canvas, world: World, readings: Heard, drawing: Drawing,
     canvas.label(["map", "legend", drawing.name], text, drawing.colour, legend, radius=-6.0 * thickness(drawing))
     draw_path(canvas, place, drawing.colour, *drawing.track[:2], thickness=thickness(drawing))
     _draw_error_line(canvas, [*place, "error"], drawing)
-    if not drawing.ghost:
+    if not drawing.is_counterfactual:
         _draw_ellipses(canvas, [*place, "covariance"], drawing)
         _draw_circles(canvas, [*place, "readings"], world, readings, drawing)
         _draw_particles(canvas, [*place, "particles"], drawing)
@@ -86,7 +86,7 @@ def _draw_circles(canvas: Canvas, place: Place, world: World, readings: Heard, d
     estimator believed it wholly, vermillion when not at all.
     """
     fates, rr = drawing.fates, canvas.rr
-    radius_m = readings.radii(fates_of(drawing.estimator_run.final))
+    radius_m = readings.radii(fates_of(drawing.final))
     asked = np.flatnonzero(~fates.met(Reason.KIND_NOT_CONSUMED))
     if not np.isfinite(radius_m[asked]).any():
         return
@@ -127,7 +127,7 @@ def newest(time_ns: Stamps, anchor: Codes, drawn: Flags, end_ns: int) -> tuple[S
 
 def _draw_particles(canvas: Canvas, place: Place, drawing: Drawing) -> None:
     """The clouds, the larger and the stronger the heavier a particle is among those of its cloud."""
-    clouds, rr = drawing.estimator_run.clouds, canvas.rr
+    clouds, rr = drawing.reviewed.clouds, canvas.rr
     if clouds is None:
         return
     starts = np.concatenate([[0], np.cumsum(clouds.lengths)[:-1]])

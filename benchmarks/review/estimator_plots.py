@@ -33,9 +33,9 @@ AXES = (Axis("x", "m", 1.0), Axis("y", "m", 1.0), Axis("heading", "°", float(np
 
 
 def draw_over_time(canvas: Canvas, world: World, frame: Frame, drawing: Drawing) -> None:
-    """All plots of one estimator; of a ghost the errors alone."""
+    """All plots of one estimator; of a counterfactual the errors alone."""
     _draw_errors(canvas, drawing)
-    if not drawing.ghost:
+    if not drawing.is_counterfactual:
         _draw_consistency(canvas, drawing)
         _draw_nees(canvas, drawing)
         _draw_effective_number(canvas, drawing)
@@ -49,7 +49,7 @@ def _draw_errors(canvas: Canvas, drawing: Drawing) -> None:
     if drawing.instants is None or drawing.score.errors is None:
         return
     name, colour, time_ns = drawing.name, drawing.colour, drawing.instants.time_ns
-    width, shown = 0.75 if drawing.ghost else 1.5, drawing.shown
+    width, shown = 0.75 if drawing.is_counterfactual else 1.5, drawing.shown
     position, heading = drawing.score.errors.position, np.degrees(drawing.score.errors.heading)
     canvas.line(["error", name], name, colour, time_ns, position, width=width, shown=shown, merge="Max")
     canvas.line(["heading_error", name], name, colour, time_ns, heading, width=width, shown=shown, merge="Max")
@@ -84,7 +84,7 @@ def _draw_nees(canvas: Canvas, drawing: Drawing) -> None:
 
 
 def _draw_effective_number(canvas: Canvas, drawing: Drawing) -> None:
-    clouds = drawing.estimator_run.clouds
+    clouds = drawing.reviewed.clouds
     if clouds is not None:
         look = (["neff", drawing.name], "effective particles", drawing.colour)
         canvas.line(*look, clouds.time_ns, clouds.effective_number)

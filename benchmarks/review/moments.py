@@ -47,10 +47,10 @@ class Moment(NamedTuple):
 
 
 def worst_moments(
-    run: Run, drawing: Drawing, start_ns: int, count: int, ghosts: Sequence[Drawing] = ()
+    run: Run, drawing: Drawing, start_ns: int, count: int, others: Sequence[Drawing] = ()
 ) -> list[Moment]:
-    """The ``count`` worst moments of an estimator, the worst first; none where nothing is judged. ``ghosts``: what it
-    would have been, whose errors at those moments stand under their names.
+    """The ``count`` worst moments of an estimator, the worst first; none where nothing is judged. ``others``: its
+    counterfactuals, whose errors at those moments stand under their names.
     """
     if drawing.instants is None or drawing.score.errors is None:
         return []
@@ -60,8 +60,8 @@ def worst_moments(
         at_ns = int(time_ns[place])
         recent = _updates_before(drawing, at_ns)
         causes = tuple(_causes(run, drawing, recent, at_ns)) or ("nothing unusual in the readings",)
-        # Ghosts are judged by the same truth, so that their instants are the same.
-        otherwise = {g.name: float(g.score.errors.position[place]) for g in ghosts if g.score.errors is not None}
+        # Counterfactuals are scored against the same truth, so that their instants are the same.
+        otherwise = {o.name: float(o.score.errors.position[place]) for o in others if o.score.errors is not None}
         what = (drawing.name, seconds(at_ns - start_ns), float(errors_m[place]), causes)
         moments.append(Moment(*what, growth(recent, drawing.instants), otherwise))
     return moments
@@ -71,7 +71,7 @@ def _updates_before(drawing: Drawing, at_ns: int) -> Sequence[Update]:
     """Those just before ``at_ns``."""
     span_ns = (at_ns - nanoseconds(JUST_BEFORE_S), at_ns)
     first, end = np.searchsorted(drawing.estimates.time_ns, span_ns, side="right").tolist()
-    return drawing.estimator_run.final[first:end]
+    return drawing.final[first:end]
 
 
 def _causes(run: Run, drawing: Drawing, recent: Sequence[Update], at_ns: int) -> Iterator[str]:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.cell import Score
 from benchmarks.metrics.catalogue import unit_of
 from benchmarks.review.canvas import mostly_jumps
 from benchmarks.review.cdf import LEAST_M
 from benchmarks.review.drawing import Drawing, drawings
+from benchmarks.review.folding import Reviewed
 from benchmarks.review.frame import MARGIN, Frame
-from benchmarks.runner.estimator_run import EstimatorRun
+from benchmarks.runner.scoring import Score
 from fusion.output.colours import ANCHOR, GROUND, TRUTH, WALL
 from fusion.output.figures import PANEL_INCHES, as_png, plain, require_matplotlib
 from fusion.output.files import write
@@ -32,12 +32,12 @@ ERRORS_INCHES = 2.6
 INK = "0.75"
 
 
-def draw_plainly(run: Run, estimator_runs: Sequence[EstimatorRun], scores: Sequence[Score], output: Path) -> Path:
+def draw_plainly(run: Run, reviewed: Sequence[Reviewed], output: Path) -> Path:
     """Write the PNG file ``output``: the floor with the true path once for each of the best estimators, and under them
     their position errors over time. Raises `FusionError` where matplotlib is missing or the place cannot be written to.
     """
     require_matplotlib()
-    write(output, as_png(figure(run, drawings(run, estimator_runs, scores))))
+    write(output, as_png(figure(run, drawings(run, reviewed))))
     return output
 
 

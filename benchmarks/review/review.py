@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import fusion
-from benchmarks.cell import Score
 from benchmarks.review.counterfactual import counterfactuals, require_within
 from benchmarks.review.drawing import drawings
-from benchmarks.review.folding import fold
+from benchmarks.review.folding import Reviewed, fold
 from benchmarks.review.frame import Frame
 from benchmarks.review.moments import Moment, worst_moments
 from benchmarks.review.picture import render
@@ -19,7 +18,6 @@ from benchmarks.review.reviewed_run import own_log
 from benchmarks.review.scene import write_scene
 from benchmarks.review.viewer import require_rerun
 from benchmarks.review.window import has_display, open_viewer
-from benchmarks.runner.estimator_run import EstimatorRun
 from fusion import ParameterError, ViewerError
 from fusion.cli.options import Settings, require_estimators, require_settings
 from fusion.output.files import require_place
@@ -59,7 +57,7 @@ def review(
     ``worst``, in the viewer. The time cursor of picture and viewer stands ``at_s`` after the start (None: at the end).
 
     ``worst``: how many of the worst moments of each estimator are looked for. ``without`` an anchor, ``reject_s`` the
-    radio measurement nearest to a time: each adds what every estimator would have made of that, as a ghost.
+    radio measurement nearest to a time: each adds what every estimator would have made of that, as a counterfactual.
 
     Raises `LogError`, `PluginError`, `ParameterError`, `ViewerError` when there is nothing to draw with or on, or
     `FusionError` for a picture that has no place.
@@ -82,24 +80,24 @@ def review(
     if at_s is not None:
         require_within(recorded, at_s, "--at")
     chosen = {name: settings.get(name, {}) for name in names}
-    estimator_runs, scores = fold(recorded, chosen, seed, instead=counterfactuals(recorded, without, reject_s))
+    reviewed = fold(recorded, chosen, seed, instead=counterfactuals(recorded, without, reject_s))
     files: list[Path] = []
     if save is not None or opens:
         # The viewer goes on reading after this program has ended, so its file has to stay.
-        files = write_scene(save or Path(tempfile.mkdtemp(prefix=PREFIX), SCENE), recorded, estimator_runs, scores)
+        files = write_scene(save or Path(tempfile.mkdtemp(prefix=PREFIX), SCENE), recorded, reviewed)
     if png is not None:
         with tempfile.TemporaryDirectory(prefix=PREFIX) as folder:
-            render(files or write_scene(Path(folder, SCENE), recorded, estimator_runs, scores), png, at_s=at_s)
+            render(files or write_scene(Path(folder, SCENE), recorded, reviewed), png, at_s=at_s)
     if opens:
         open_viewer(files, at_s=at_s)
-    return Review(files, _worst(recorded, estimator_runs, scores, worst) if worst else [])
+    return Review(files, _worst(recorded, reviewed, worst) if worst else [])
 
 
-def _worst(run: Run, estimator_runs: Sequence[EstimatorRun], scores: Sequence[Score], count: int) -> list[Moment]:
-    """Of every estimator, the best first; ghosts are compared, not searched."""
-    start_ns, drawn, found = Frame.around(run).start_ns, drawings(run, estimator_runs, scores), []
+def _worst(run: Run, reviewed: Sequence[Reviewed], count: int) -> list[Moment]:
+    """Of every estimator, the best first; counterfactuals are compared, not searched."""
+    start_ns, drawn, found = Frame.around(run).start_ns, drawings(run, reviewed), []
     for drawing in drawn:
-        if not drawing.ghost:
-            ghosts = [other for other in drawn if other.estimator_run.counterfactual_of == drawing.name]
-            found += worst_moments(run, drawing, start_ns, count, ghosts)
+        if not drawing.is_counterfactual:
+            others = [other for other in drawn if other.reviewed.counterfactual_of == drawing.name]
+            found += worst_moments(run, drawing, start_ns, count, others)
     return found

@@ -9,9 +9,8 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
-from benchmarks.cell import cached_run
 from benchmarks.runner.adhoc_suite import require_log
-from benchmarks.runner.run_source import open_run
+from benchmarks.runner.run_source import open_log, open_run
 from benchmarks.runner.suite import load_suite
 from fusion import LogError, ParameterError, Ranges, WifiScan
 from logs.cli.import_ import given_options
@@ -38,7 +37,7 @@ def own_log(path: Path) -> Run:
     if path.is_dir() or (path.is_file() and not holds_run(path)):
         raise LogError(f"{path}: is no log of ours; for a ROS 2 bag give --world WORLD.toml, and --topic for its truth")
     require_log(path)
-    return cached_run(path)
+    return open_log(path)
 
 
 def remarks(run: Run) -> Iterator[str]:

@@ -12,45 +12,41 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from benchmarks.cell import Score
-from benchmarks.metrics.catalogue import COLUMNS, Column, as_text
+from benchmarks.metrics.catalogue import COLUMNS, column
 from benchmarks.review.base_layer import draw_base, properties
 from benchmarks.review.blueprint import blueprint
 from benchmarks.review.canvas import Canvas
 from benchmarks.review.cdf import CdfAxes, draw_curve
-from benchmarks.review.drawing import Drawing, drawings
+from benchmarks.review.drawing import Drawing, drawings, entry_of
 from benchmarks.review.estimator_layer import draw_on_map, thickness
 from benchmarks.review.estimator_plots import draw_over_time
+from benchmarks.review.folding import Reviewed
 from benchmarks.review.frame import Frame
 from benchmarks.review.listing import line
 from benchmarks.review.moments import worst_moments
 from benchmarks.review.radio_circles import heard
 from benchmarks.review.viewer import require_rerun
-from benchmarks.runner.estimator_run import EstimatorRun
-from benchmarks.runner.leaderboard import ranked
+from benchmarks.runner.leaderboard import leaderboard
 from fusion.output.files import require_place, write
+from fusion.output.tables import as_markdown
 from logs.run import Run
 
-AGES = (Column("age_p95", "age", 1.0, 2), Column("dropouts", "gaps", 1.0, 0))
+AGES = (column("age_p95", "age"), column("dropouts", "gaps"))
 """How old the newest answer was at 95 % of the instants [s], and how often there was none for a while."""
 APPLICATION = "fusion"
 SUFFIX = ".rrd"
 
 
-def write_scene(output: Path, run: Run, estimator_runs: Sequence[EstimatorRun], scores: Sequence[Score]) -> list[Path]:
-    """Write the review of ``run``, which brings its own layout; ``scores`` are those of ``estimator_runs``.
+def write_scene(output: Path, run: Run, reviewed: Sequence[Reviewed]) -> list[Path]:
+    """Write the review of ``run``, which brings its own layout.
 
     ``output``: one file when its name ends in ``.rrd``, else a folder for ``base.rrd`` and a file for each estimator.
     Answers the files, which are to be opened together. Raises `ViewerError` where Rerun is not installed,
     `FusionError` where a file cannot be written.
     """
     rr = require_rerun()
-    base, layers = files(output, [estimator_run.name for estimator_run in estimator_runs])
-    frame, drawn, readings = (
-        Frame.around(run),
-        drawings(run, estimator_runs, scores),
-        heard(run.world, run.measurements),
-    )
+    base, layers = files(output, [one.name for one in reviewed])
+    frame, drawn, readings = Frame.around(run), drawings(run, reviewed), heard(run.world, run.measurements)
     axes, legend = _axes(drawn), frame.legend(1 + len(drawn))
     identity = f"{run.name} {run.world.hash[:12]}"
     with _recording(base, identity, blueprint(frame, run, drawn)) as recording:
@@ -58,7 +54,7 @@ def write_scene(output: Path, run: Run, estimator_runs: Sequence[EstimatorRun], 
         recording.send_property("run", rr.AnyValues(**properties(run, frame)))
         canvas = Canvas(rr, recording, frame.start_ns, frame.timelines)
         draw_base(canvas, run, frame, readings, axes, legend[0])
-        text = markdown(scores) + _worst(run, drawn, frame.start_ns)
+        text = markdown(drawn) + _worst(run, drawn, frame.start_ns)
         canvas.style(["scores"], rr.TextDocument(text, media_type="text/markdown"))
         for drawing, place in zip(drawn, legend[1:], strict=True):
             with _recording(layers[drawing.name], identity) if layers else nullcontext(recording) as own:
@@ -70,12 +66,12 @@ def write_scene(output: Path, run: Run, estimator_runs: Sequence[EstimatorRun], 
     return [base, *layers.values()]
 
 
-def files(output: Path, estimator_runs: Sequence[str]) -> tuple[Path, Mapping[str, Path]]:
+def files(output: Path, names: Sequence[str]) -> tuple[Path, Mapping[str, Path]]:
     """The file of the base layer, and those of the estimators by name: none where all is in one file."""
     if output.suffix == SUFFIX:
         return output, {}
     # A name may hold what a file system cannot: "ekf without 02:00:5e:00".
-    return output / f"base{SUFFIX}", {name: output / f"{quote(name, safe=' ')}{SUFFIX}" for name in estimator_runs}
+    return output / f"base{SUFFIX}", {name: output / f"{quote(name, safe=' ')}{SUFFIX}" for name in names}
 
 
 @contextmanager
@@ -103,20 +99,14 @@ def _axes(drawn: Sequence[Drawing]) -> CdfAxes | None:
 
 def _worst(run: Run, drawn: Sequence[Drawing], start_ns: int) -> str:
     """The worst moment of each estimator that is shown, as a list; empty where nothing is judged."""
-    shown = [drawing for drawing in drawn if drawing.shown and not drawing.ghost]
+    shown = [drawing for drawing in drawn if drawing.shown and not drawing.is_counterfactual]
     found = [moment for drawing in shown for moment in worst_moments(run, drawing, start_ns, 1)]
     return "".join(["\nWorst moments\n\n", *(f"- {line(moment)}\n" for moment in found)]) if found else ""
 
 
-def markdown(scores: Sequence[Score]) -> str:
-    """The score table, the best first, and why an estimator is missing from it; the view's name tells the units."""
-    columns = (*COLUMNS, *AGES)
-    titles = ["estimator", *(column.title.partition("\n")[0] for column in columns)]
-    lines = ["| " + " | ".join(titles) + " |", "|---" * len(titles) + "|"]
-    for score in ranked(scores):
-        values = {**score.facts, **score.metrics}
-        remark = "" if score.status in ("ok", "unscored") else f" ({score.status})"
-        cells = [score.estimator + remark, *(as_text(column, values) for column in columns)]
-        lines.append("| " + " | ".join(cells) + " |")
-    lost = [f"\n{score.estimator} {score.status}: {score.error}" for score in scores if score.error is not None]
-    return "\n".join([*lines, *lost]) + "\n"
+def markdown(drawn: Sequence[Drawing]) -> str:
+    """The table of scores, the best first, and why an estimator is missing from it."""
+    table = leaderboard("Scores", [entry_of(drawing.reviewed) for drawing in drawn], (*COLUMNS, *AGES))
+    ends = [(drawing.name, drawing.score.end) for drawing in drawn]
+    lost = [f"\n{name} {end.status}: {end.error}" for name, end in ends if end.error is not None]
+    return "\n".join([as_markdown(table), *lost]) + "\n"

@@ -1,25 +1,24 @@
-"""Estimators scored on logs, without a suite file."""
+"""Estimators scored on logs without a suite file: a suite built in memory, its store gone when it is done."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping, Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import fusion
-from benchmarks.cell import STATUSES, Cell, Score, cached_run, crashed, score_cell
-from benchmarks.metrics.score import pool
-from benchmarks.runner.workers import TaskFailure, compute
+from benchmarks.runner.leaderboard import entries, leaderboard
+from benchmarks.runner.plan import unkept_cells
+from benchmarks.runner.results import Result, by_run, detailed, partly_headed, read_results
+from benchmarks.runner.run_suite import carry_out_cells
+from benchmarks.runner.store import Store
+from benchmarks.runner.suite import CLEAN, CellLimits, EstimatorSpec, Evaluation, FaultSet, Gate, RunSource, Suite
 from fusion import LogError
 from fusion.cli.options import Settings, require_estimators, require_settings
 from fusion.output.files import write_json
 from fusion.output.progress import Progress
-
-POOLED = "all runs"
-
-
-LOST = "the worker process died, twice; run it alone with --workers 1 to see why"
+from fusion.output.tables import Sheet
+from logs.reader import read_world
 
 
 def bench(
@@ -30,7 +29,7 @@ def bench(
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
-) -> list[Score]:
+) -> list[Result]:
     """The score of every estimator (None: of all available) on every run, in that order, runs first.
 
     Everything that can be refused is refused before any work: raises `PluginError`, `ParameterError` or `LogError`.
@@ -38,18 +37,12 @@ def bench(
     """
     chosen = tuple(dict.fromkeys(fusion.available() if estimators is None else estimators))
     check(runs, chosen, settings or {})
-    cells = [Cell(path, name, dict((settings or {}).get(name, {})), seed) for path in runs for name in chosen]
-    workers = min(os.cpu_count() or 1 if workers is None else workers, len(cells))
-    scores: dict[int, Score] = {}
-    for index, score in compute(score_cell, _lost, cells, workers):
-        scores[index] = score
-        if progress is not None:
-            progress(len(scores), len(cells), f"{score.run} {score.estimator}")
-    return [scores[index] for index in sorted(scores)]
-
-
-def _lost(cell: Cell, _: TaskFailure) -> Score:
-    return crashed(cell, LOST)
+    cells = unkept_cells(adhoc_suite(runs, chosen, settings or {}), seed)
+    with tempfile.TemporaryDirectory(prefix="fusion-bench-") as folder:
+        store = Store(Path(folder))
+        done = carry_out_cells(cells, store, None, workers=workers, progress=progress)
+        cpu_s = {one.cell.estimate_key: one.carried.cpu_s for one in done}
+        return [one._replace(cpu_s=cpu_s[one.cell.estimate_key]) for one in read_results(cells, store)]
 
 
 def check(runs: Sequence[Path], estimators: Sequence[str], settings: Settings) -> None:
@@ -58,7 +51,7 @@ def check(runs: Sequence[Path], estimators: Sequence[str], settings: Settings) -
     for path in runs:
         require_log(path)
     if settings:
-        require_settings(settings, estimators, cached_run(runs[0]).world)
+        require_settings(settings, estimators, read_world(runs[0]))
 
 
 def require_log(path: Path) -> None:
@@ -67,43 +60,55 @@ def require_log(path: Path) -> None:
         raise LogError(f"{path}: no such file; give an MCAP log (`fusion simulate` makes one)")
 
 
-def pooled(scores: Sequence[Score]) -> list[Score]:
-    """One score per estimator over all instants of all runs together; its status is the worst of its runs'."""
-    together = []
-    for name in dict.fromkeys(score.estimator for score in scores):
-        own = [score for score in scores if score.estimator == name]
-        measured = [score.errors for score in own if score.errors is not None]
-        status = max((score.status for score in own), key=STATUSES.index)
-        facts = {"cpu_per_measurement_s": _pooled_cost(own)}
-        together.append(Score(POOLED, name, status, errors=pool(measured) if measured else None, facts=facts))
-    return together
+def adhoc_suite(runs: Sequence[Path], estimators: Sequence[str], settings: Settings) -> Suite:
+    """The suite of these logs and estimators, each with its ``settings``, of one seed and without a fault."""
+    unique = dict.fromkeys(runs)
+    stems = [path.stem for path in unique]
+    ids = [path.stem if stems.count(path.stem) == 1 else str(path) for path in unique]
+    return Suite(
+        name="bench",
+        seed=0,
+        seeds=1,
+        evaluation=Evaluation(),
+        limits=CellLimits(),
+        runs=tuple(RunSource(name, mcap=str(path)) for name, path in zip(ids, unique, strict=True)),
+        estimators=tuple(EstimatorSpec(name, name, dict(settings.get(name, {}))) for name in estimators),
+        faults=(FaultSet(CLEAN),),
+        gate=Gate(),
+        path=Path("bench.toml").resolve(),
+    )
 
 
-def _pooled_cost(scores: Sequence[Score]) -> float | None:
-    """Processor time per measurement over the runs the estimator survived."""
-    facts: list[Mapping[str, Any]] = [score.facts for score in scores if "cpu_s" in score.facts]
-    measurements = sum(fact["measurements"] for fact in facts)
-    return sum(fact["cpu_s"] for fact in facts) / measurements if measurements else None
+def tables(results: Sequence[Result]) -> list[Sheet]:
+    """A leaderboard for each run, and one over those with truth where these are several."""
+    each = by_run(results)
+    made = []
+    for run, own in each.items():
+        title = run if own[0].has_truth else f"{run}, without truth"
+        made.append(leaderboard(title, entries(own)))
+    scored = sum(own[0].has_truth for own in each.values())
+    if scored > 1:
+        which = f"all {scored} runs" if scored == len(each) else f"the {scored} runs with truth"
+        made.append(leaderboard(f"{which}: medians over runs", entries(results)))
+    return made
 
 
-def remarks(scores: Sequence[Score]) -> list[str]:
-    """What the tables cannot show: logs without truth, warnings of logs, why an estimator was lost."""
-    from benchmarks.runner.leaderboard import partly_headed
-
-    told: list[str] = []
-    for score in scores:
-        warnings = score.facts["warnings"]
-        if isinstance(warnings, list):
-            told += [f"{score.run}: {warning}" for warning in warnings]
-        if sentence := partly_headed(score.metrics):
-            told.append(f"{score.run}: {sentence}")
-        if score.errors is None:
-            told.append(f"{score.run} holds no ground truth: no errors are scored, only NIS, availability and time")
-        if score.error is not None:
-            told.append(f"{score.run}: {score.estimator} {score.status}: {score.error}")
-    return list(dict.fromkeys(told))
+def remarks(results: Sequence[Result]) -> list[str]:
+    """A sentence for everything that the tables cannot show: warnings of logs, logs without truth, lost estimators."""
+    return list(dict.fromkeys(sentence for result in results for sentence in _remarks(result)))
 
 
-def write_records(scores: Sequence[Score], output: Path) -> None:
-    """The records of `Score.record` as one JSON list; ``-`` is stdout."""
-    write_json(output, [score.record() for score in scores], indent=1)
+def _remarks(result: Result) -> Iterator[str]:
+    for warning in result.warnings:
+        yield f"{result.run}: {warning}"
+    if sentence := partly_headed(result):
+        yield f"{result.run}: {sentence}"
+    if not result.has_truth:
+        yield f"{result.run} holds no ground truth: no errors are scored, only NIS, availability and time"
+    if result.error is not None:
+        yield f"{result.run}: {result.estimator} {result.status}: {result.error}"
+
+
+def write_records(results: Sequence[Result], output: Path) -> None:
+    """Everything that is known of each result as one JSON list; ``-`` is stdout."""
+    write_json(output, [detailed(result) for result in results], indent=1)

@@ -47,11 +47,11 @@ def _as_done(dask: Any, futures: dict[Any, Cell]) -> Iterator[Done]:  # noqa: AN
     for future in dask.as_completed(list(futures)):
         cell = futures[future]
         try:
-            status = future.result()
+            carried = future.result()
         except dask.KilledWorker:
             unfinished.append(cell)
         else:
-            yield Done(cell, status)
+            yield Done(cell, carried)
         future.release()
     if unfinished:
         raise FusionError(

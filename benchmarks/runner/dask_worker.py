@@ -13,7 +13,7 @@ from queue import LifoQueue
 
 from distributed import Reschedule, Worker, WorkerPlugin, get_worker
 
-from benchmarks.runner.execute import carry_out, give_up
+from benchmarks.runner.execute import Carried, carry_out, give_up
 from benchmarks.runner.plan import Cell
 from benchmarks.runner.workers import Limits, WorkerPool
 
@@ -34,7 +34,7 @@ class CellProcesses(WorkerPlugin):
         # behind. Ours end with their parent.
         current_process().daemon = False
         self._pools = [WorkerPool(carry_out, give_up, self._limits, IDLE_S) for _ in range(worker.state.nthreads)]
-        self._free: LifoQueue[WorkerPool[Task, str]] = LifoQueue()
+        self._free: LifoQueue[WorkerPool[Task, Carried]] = LifoQueue()
         for pool in self._pools:
             self._free.put(pool)
 
@@ -43,17 +43,17 @@ class CellProcesses(WorkerPlugin):
         for pool in self._pools:
             pool.dismiss()
 
-    def carry_out(self, task: Task) -> str:
-        """Make what is missing of one cell within the limits; answers its status. Raises `CancelledError`."""
+    def carry_out(self, task: Task) -> Carried:
+        """Make what is missing of one cell within the limits. Raises `CancelledError`."""
         pool = self._free.get()
         try:
-            ((_, status),) = pool.compute([task], workers=1)
+            ((_, carried),) = pool.compute([task], workers=1)
         finally:
             self._free.put(pool)
-        return status
+        return carried
 
 
-def carry_out_here(plugin: str, task: Task) -> str:
+def carry_out_here(plugin: str, task: Task) -> Carried:
     """One cell on the Dask worker that this runs on, in the processes of the `CellProcesses` of that name.
 
     A worker that is closing ends them; the cell is then somebody else's.

@@ -1,4 +1,4 @@
-"""One estimator over one run: everything it said, what it cost, and how it ended if it did not survive."""
+"""One estimator over one run: all its updates, its processor time, and why it ended if it did not survive."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import TypeAlias
 import fusion
 from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.fates import FateColumns
-from benchmarks.review.particle_clouds import Clouds
 from fusion import Fold, FusionError, Moment, Timeline, Update
 from fusion.timeline import Key
 from logs.prior import starting_prior
@@ -27,23 +26,19 @@ class EstimatorRun:
 
     ``updates`` stand in the order of arrival, revisions among them; ``digest`` certifies them. ``cpu_s`` is the
     processor time of the fold alone. ``error`` is None, or why the estimator stopped: ``updates`` ends there then,
-    ``digest`` is empty and ``cpu_s`` zero. ``counterfactual_of``: the estimator whose counterfactual
-    this is, None for a run that took place. ``clouds``: its particles, where they were watched. ``true_stamps``: those
-    of the run.
+    ``digest`` is empty and ``cpu_s`` zero. ``true_stamps``: those of the run.
     """
 
     name: str
-    updates: tuple[Update, ...]
-    digest: str
-    cpu_s: float
-    error: str | None
-    counterfactual_of: str | None = None
-    clouds: Clouds | None = None
+    updates: tuple[Update, ...] = ()
+    digest: str = ""
+    cpu_s: float = 0.0
+    error: str | None = None
     true_stamps: Mapping[Key, int] = field(default_factory=dict)
 
     @cached_property
     def final(self) -> tuple[Update, ...]:
-        """The last word on each measurement, in time order."""
+        """The final update of each measurement, in time order."""
         return tuple(fusion.final(self.updates))
 
     @cached_property
@@ -53,7 +48,7 @@ class EstimatorRun:
 
     @cached_property
     def fates(self) -> FateColumns:
-        """The last word on every reading, as columns."""
+        """The final fate of every reading, as columns."""
         return FateColumns.of(self.final)
 
 

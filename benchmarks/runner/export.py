@@ -8,9 +8,9 @@ from io import StringIO
 from pathlib import Path
 from xml.etree import ElementTree
 
-from benchmarks.cell import ALIVE
-from benchmarks.runner.leaderboard import leaderboard
+from benchmarks.runner.leaderboard import suite_leaderboard
 from benchmarks.runner.results import Result, flat, record
+from benchmarks.runner.scoring import ALIVE
 from benchmarks.runner.suite import Suite
 from fusion.output.files import write, write_json
 from fusion.output.tables import Sheet, as_markdown
@@ -79,9 +79,12 @@ WRITERS: dict[str, tuple[Writer, str]] = {
         "every number; a baseline for gate",
     ),
     "csv": (lambda _, results, path: write(path, as_csv(results)), "one row per cell"),
-    "latex": (lambda _, results, path: write(path, as_latex(leaderboard(results))), "the leaderboard as a tabular"),
+    "latex": (
+        lambda _, results, path: write(path, as_latex(suite_leaderboard(results))),
+        "the leaderboard as a tabular",
+    ),
     "markdown": (
-        lambda _, results, path: write(path, (as_markdown(leaderboard(results)) + "\n").encode()),
+        lambda _, results, path: write(path, (as_markdown(suite_leaderboard(results)) + "\n").encode()),
         "the leaderboard as a table",
     ),
     "junit": (lambda suite, results, path: write(path, as_junit(suite, results)), "one test case per cell"),

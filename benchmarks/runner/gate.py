@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.cell import ALIVE
 from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.runner.results import Result, by_estimator, score_matrix
+from benchmarks.runner.scoring import ALIVE
 from benchmarks.runner.suite import CLEAN, TEST, Gate
 from benchmarks.statistics.verdict import compare
 from fusion import SuiteError

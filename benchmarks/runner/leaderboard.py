@@ -4,110 +4,114 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import IO
+from typing import NamedTuple
 
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
-
-from benchmarks.cell import ALIVE, STATUSES, Score
-from benchmarks.metrics.catalogue import COLUMNS, RANKED_BY, Column, as_text
+from benchmarks.metrics.catalogue import COLUMNS, COST, RANKED_BY, Column, column
 from benchmarks.metrics.innovations import NAMES
 from benchmarks.runner.results import Result, by_estimator, median_metrics
+from benchmarks.runner.scoring import ALIVE, STATUSES
 from benchmarks.runner.suite import CLEAN
 from benchmarks.statistics.verdict import Comparison, Verdict
-from fusion.output.tables import Sheet, console
+from fusion.output.tables import Sheet
 
-TRUTHLESS = COLUMNS[-2:]
-"""Those that need no truth."""
-
-
-def partly_headed(metrics: Mapping[str, float]) -> str:
-    """A sentence where the true heading is known at some instants only; else ""."""
-    count, headed = metrics.get("n", math.nan), metrics.get("head_n", math.nan)
-    if not 0.0 < headed < count:
-        return ""
-    return f"the true heading is known at {headed:.0f} of {count:.0f} instants, and heading errors are of these alone"
+WORST = "pos_rmse_worst"
+"""The greatest RMSE of any cell."""
+COST_COLUMN, WORST_COLUMN = (
+    column(COST.id, "time"),
+    column("pos_rmse", "worst\nRMSE", separator=" ")._replace(key=WORST),
+)
+AVAILABILITY_COLUMN = COLUMNS[-1]
 
 
-def ranked(scores: Sequence[Score]) -> list[Score]:
-    """The best first: by status, then by the third quartile of the position error, infinite last."""
+class Entry(NamedTuple):
+    """One row: an estimator, the statuses of its cells, and its metrics, of several cells their medians."""
 
-    def key(score: Score) -> tuple[int, float, str]:
-        third_quartile = score.metrics.get("pos_p75", math.nan)
-        return STATUSES.index(score.status), math.inf if math.isnan(third_quartile) else third_quartile, score.estimator
+    name: str
+    statuses: tuple[str, ...]
+    metrics: Mapping[str, float]
 
-    return sorted(scores, key=key)
-
-
-def print_tables(scores: Sequence[Score], pooled: Sequence[Score], file: IO[str] | None = None) -> None:
-    """One table per run, and one over all of them where there are several with truth."""
-    output = console(file)
-    by_log: dict[object, list[Score]] = {}
-    for score in scores:
-        by_log.setdefault(score.facts.get("log", score.run), []).append(score)
-    for own in by_log.values():
-        output.print((_table if _is_scored(own) else _truthless)(own[0].run, own))
-    scored = sum(map(_is_scored, by_log.values()))
-    if scored > 1:
-        which = f"all {scored} runs" if scored == len(by_log) else f"the {scored} runs with truth"
-        output.print(_table(f"{which} together", pooled))
+    @property
+    def lost(self) -> int:
+        """The number of cells that were lost."""
+        return sum(status not in ALIVE for status in self.statuses)
 
 
-def _is_scored(scores: Sequence[Score]) -> bool:
-    return any(score.errors is not None for score in scores)
+def rank(entry: Entry) -> tuple[int, int, float, str]:
+    """Sort key, the best first: by cells that were lost, by how they ended, then by the ranking metric."""
+    ranking = entry.metrics.get(RANKED_BY, math.nan)
+    worst = max(map(STATUSES.index, entry.statuses))
+    return entry.lost, worst, math.inf if math.isnan(ranking) else ranking, entry.name
 
 
-def _truthless(run: str, scores: Sequence[Score]) -> Table:
-    """A table for a log without truth: NIS of the readings beside an honest filter's band, availability and time."""
-    columns: list[Column] = []
-    for sensor in NAMES:
-        if any(f"nis_{sensor}" in score.facts for score in scores):
-            columns += [
-                Column(f"nis_{sensor}", f"{sensor}\nNIS", 1.0, 2),
-                Column(f"nis_{sensor}_low", "honest\nfrom", 1.0, 2),
-                Column(f"nis_{sensor}_high", "\nto", 1.0, 2),
-                Column(f"nis95_{sensor}", "inside\n95 %, %", 100.0, 1),
-            ]
-    return _table(f"{run}, without truth", scores, "consistency of\nestimator", (*columns, *TRUTHLESS))
+def entries(results: Sequence[Result], fault: str = CLEAN) -> list[Entry]:
+    """The estimators under one fault, each with the medians over its cells that count, its worst RMSE and its cost."""
+    return [_entry(name, own) for name, own in by_estimator(results, fault).items()]
 
 
-def _table(
-    title: str,
-    scores: Sequence[Score],
-    corner: str = "position error of\nestimator",
-    columns: Sequence[Column] = COLUMNS,
-) -> Table:
-    table = Table(title=title, box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
-    table.add_column(corner, no_wrap=True)
-    for column in columns:
-        table.add_column(column.title, justify="right", no_wrap=True)
-    for score in ranked(scores):
-        remark = "" if score.status in ("ok", "unscored") else f" ({score.status})"
-        values = {**score.facts, **score.metrics}
-        table.add_row(score.estimator + remark, *(as_text(column, values) for column in columns))
-    return table
+def _entry(name: str, own: Sequence[Result]) -> Entry:
+    metrics = median_metrics(own)
+    if len(own) > 1:
+        metrics[WORST] = max((one.metrics.get("pos_rmse", math.nan) for one in own), key=_known)
+    costs = [one.cost_s for one in own if one.cost_s is not None]
+    if costs:
+        metrics[COST.id] = sum(costs) / len(costs)
+    return Entry(name, tuple(one.status for one in own), metrics)
 
 
-def leaderboard(results: Sequence[Result], fault: str = CLEAN) -> Sheet:
-    """The estimators, the best first: by how many cells were lost, then by the median of the ranking metric."""
-    shown = [column for column in COLUMNS if column.key != "cpu_per_measurement_s"]
-    rows = []
-    for name, own in by_estimator(results, fault).items():
-        lost, medians = sum(result.status not in ALIVE for result in own), median_metrics(own)
-        numbers = (as_text(column, medians) for column in shown)
-        rows.append(((lost, medians.get(RANKED_BY, math.inf), name), (name, f"{len(own) - lost}/{len(own)}", *numbers)))
-    head = ("position error of", "cells ok", *(column.title for column in shown))
-    return Sheet(f"{fault}: medians over cells", head, tuple(row for _, row in sorted(rows)))
+def _known(value: float) -> float:
+    return -math.inf if math.isnan(value) else value
 
 
-def sheet(judged: Comparison) -> Sheet:
+def leaderboard(title: str, rows: Sequence[Entry], columns: Sequence[Column] | None = None) -> Sheet:
+    """The estimators, the best first; ``columns`` None: those that they have."""
+    shown = columns_of(rows) if columns is None else columns
+    several = any(len(row.statuses) > 1 for row in rows)
+    corner = "position error of\nestimator" if any("n" in row.metrics for row in rows) else "consistency of\nestimator"
+    head = (corner, *(["cells ok"] if several else []), *(one.title for one in shown))
+    ranking = sorted(rows, key=rank)
+    lines = [(*_name(row, several), *(one.text(row.metrics) for one in shown)) for row in ranking]
+    return Sheet(title, head, tuple(lines))
+
+
+def columns_of(rows: Sequence[Entry]) -> list[Column]:
+    """Position errors; where there is no truth, consistency of the readings. With the cost where that was measured."""
+    known = {name for row in rows for name in row.metrics}
+    cost = [COST_COLUMN] if COST.id in known else []
+    if "n" not in known:
+        consistency = [one for sensor in NAMES if f"nis_{sensor}" in known for one in _nis(sensor)]
+        return [*consistency, AVAILABILITY_COLUMN, *cost]
+    worst = [WORST_COLUMN] if WORST in known else []
+    return [COLUMNS[0], *worst, *COLUMNS[1:], *cost]
+
+
+def _nis(sensor: str) -> tuple[Column, ...]:
+    """NIS of a sensor's readings beside an honest filter's band."""
+    return (
+        column(f"nis_{sensor}", f"{sensor}\nNIS"),
+        column(f"nis_{sensor}_low", "honest\nfrom"),
+        column(f"nis_{sensor}_high", "\nto"),
+        column(f"nis95_{sensor}", "inside\n95 %", separator=", "),
+    )
+
+
+def _name(row: Entry, several: bool) -> tuple[str, ...]:
+    if several:
+        return row.name, f"{len(row.statuses) - row.lost}/{len(row.statuses)}"
+    return (f"{row.name} ({row.statuses[0]})" if row.lost else row.name,)
+
+
+def suite_leaderboard(results: Sequence[Result], fault: str = CLEAN) -> Sheet:
+    """The leaderboard of a suite under one fault."""
+    return leaderboard(f"{fault}: medians over cells", entries(results, fault))
+
+
+def pair_table(judged: Comparison) -> Sheet:
     """Every pair as one row."""
     rows = []
     for verdict in judged.verdicts:
-        runs = f"{verdict.compared} of {verdict.runs}"
         numbers = (
             _ratio(verdict),
-            runs,
+            f"{verdict.compared} of {verdict.runs}",
             f"{verdict.holm_p:.2g}",
             f"{verdict.signed_rank.p:.2g}",
         )

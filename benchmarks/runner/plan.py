@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
@@ -48,15 +48,32 @@ def cells_of(suite: Suite, store: Store) -> list[Cell]:
     made = {estimator.id: estimator_identity(estimator) for estimator in suite.estimators}
     for fault in suite.faults:
         read_faults(fault)
-    folder, rules = suite.folder, asdict(suite.evaluation)
-    cells = []
-    for run in suite.runs:
-        content = content_of(run, folder, store)
+    contents = [content_of(run, suite.folder, store) for run in suite.runs]
+    return _cells(suite, contents, made, range(suite.seeds))
+
+
+def unkept_cells(suite: Suite, seed: int) -> list[Cell]:
+    """Every cell with this seed, for a store that lives no longer than this process: the names of runs and estimators
+    are keys enough, and no run has to be opened for them.
+    """
+    contents = [Content(run.id, run.id) for run in suite.runs]
+    made = {estimator.id: {"estimator": estimator.id} for estimator in suite.estimators}
+    return _cells(suite, contents, made, [seed])
+
+
+def _cells(
+    suite: Suite,
+    contents: Sequence[Content],
+    made: Mapping[str, Mapping[str, object]],
+    seeds: Sequence[int],
+) -> list[Cell]:
+    cells, rules = [], asdict(suite.evaluation)
+    for run, content in zip(suite.runs, contents, strict=True):
         judged = {"truth": content.truth, "evaluation": rules, "metrics": METRICS_VERSION}
-        for fault, estimator, seed in product(suite.faults, suite.estimators, range(suite.seeds)):
+        for fault, estimator, seed in product(suite.faults, suite.estimators, seeds):
             spec = {**made[estimator.id], **run_identity(suite, run, fault, content), "seed": seed}
             key = key_of(spec)
-            drawn = (run, estimator, fault, seed, suite.seed, suite.evaluation, suite.limits, folder, content)
+            drawn = (run, estimator, fault, seed, suite.seed, suite.evaluation, suite.limits, suite.folder, content)
             cells.append(Cell(*drawn, key, key_of({"estimate": key, **judged})))
     return cells
 

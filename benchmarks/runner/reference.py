@@ -1,4 +1,4 @@
-"""What the cells of a run are judged against, kept in the store: opening a run takes longer than scoring its cells."""
+"""The truth that the cells of a run are scored against, kept in the store: opening a run takes longer than scoring."""
 
 from __future__ import annotations
 
@@ -22,12 +22,18 @@ KIND = "references"
 
 class Reference(NamedTuple):
     """The truth of a run and the instants at which it is compared, both empty where there is none, and the first time
-    that its measurements tell of.
+    that its measurements cover.
     """
 
     truth: TruthTrack
     instants: Instants
     begin_ns: int
+
+    @classmethod
+    def of(cls, run: Run) -> Reference:
+        """The reference of a run by the usual rules."""
+        truth = run.truth or TruthTrack.from_truths([])
+        return cls(truth, evaluation_instants(truth), begin_ns(run.measurements))
 
 
 def reference_of(cell: Cell, store: Store) -> Reference:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import argparse
 import math
+import platform
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from benchmarks.cli.bench_plan import opened
+import fusion
 from benchmarks.metrics.catalogue import RANKED_BY
 from benchmarks.metrics.score import METRICS_VERSION, quantile
 from benchmarks.runner.execute import read_metrics
-from benchmarks.runner.plan import Cell, cells_of
+from benchmarks.runner.plan import Cell
 from benchmarks.runner.store import Store
 from benchmarks.runner.suite import CLEAN, TEST, Suite
 from benchmarks.statistics.verdict import Comparison, compare
@@ -25,7 +25,8 @@ from fusion.errors import did_you_mean
 class Result(NamedTuple):
     """One cell's score: infinite and NaN metrics are what `benchmarks.metrics.score` says they are. ``error``: why it
     was lost. ``worst_at_s``: when its position error was greatest, since the start of the run; None where there is no
-    error, or no score. ``warnings``: a sentence for each thing that is wrong with its run.
+    error, or no score. ``facts``: what became of the run and its readings. ``cpu_s``: the processor time of the fold,
+    where that took place now.
     """
 
     cell: Cell
@@ -33,9 +34,35 @@ class Result(NamedTuple):
     error: str | None
     digest: str
     metrics: Mapping[str, float]
-    facts: Mapping[str, object]
+    facts: Mapping[str, Any]
     worst_at_s: float | None
-    warnings: tuple[str, ...] = ()
+    cpu_s: float | None = None
+
+    @property
+    def run(self) -> str:
+        """The id of the run."""
+        return self.cell.run.id
+
+    @property
+    def estimator(self) -> str:
+        """The id of the estimator."""
+        return self.cell.estimator.id
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence for each thing that is wrong with the run."""
+        return tuple(self.facts["warnings"])
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether there was anything to score it against."""
+        return "n" in self.metrics
+
+    @property
+    def cost_s(self) -> float | None:
+        """Processor time per measurement [s]; None where it was not measured."""
+        count = self.facts["measurements"]
+        return self.cpu_s / count if self.cpu_s is not None and count else None
 
 
 def read_results(cells: Iterable[Cell], store: Store) -> list[Result]:
@@ -45,14 +72,22 @@ def read_results(cells: Iterable[Cell], store: Store) -> list[Result]:
         if store.has("scores", cell.score_key):
             scored = store.read_json("scores", cell.score_key, "result.json")
             made = store.read_json("estimates", cell.estimate_key, "result.json")
-            told = (scored["status"], scored["error"], made["digest"], read_metrics(scored), made, scored["worst_at_s"])
-            found.append(Result(cell, *told, tuple(made.get("warnings", ()))))
+            ended = (scored["status"], scored["error"], made["digest"])
+            found.append(Result(cell, *ended, read_metrics(scored), made, scored["worst_at_s"]))
     return found
+
+
+def partly_headed(result: Result) -> str:
+    """A sentence where the true heading is known at some instants only; else ""."""
+    count, headed = (result.metrics.get(name, math.nan) for name in ("n", "head_n"))
+    if not 0.0 < headed < count:
+        return ""
+    return f"the true heading is known at {headed:.0f} of {count:.0f} instants, and heading errors are of these alone"
 
 
 def warnings(results: Sequence[Result]) -> list[str]:
     """What is wrong with the runs, a sentence each after the id of the run."""
-    return list(dict.fromkeys(f"{one.cell.run.id}: {warning}" for one in results for warning in one.warnings))
+    return list(dict.fromkeys(f"{one.run}: {warning}" for one in results for warning in one.warnings))
 
 
 def require_metric(metric: str, results: Sequence[Result]) -> None:
@@ -67,7 +102,7 @@ def judged(results: Sequence[Result]) -> list[Result]:
     of all.
     """
     test = [result for result in results if result.cell.run.split == TEST] or list(results)
-    return [result for result in test if result.cell.content.truth] or test
+    return [result for result in test if result.has_truth] or test
 
 
 def by_estimator(results: Sequence[Result], fault: str = CLEAN) -> dict[str, list[Result]]:
@@ -75,7 +110,7 @@ def by_estimator(results: Sequence[Result], fault: str = CLEAN) -> dict[str, lis
     grouped: dict[str, list[Result]] = {}
     for result in judged(results):
         if result.cell.fault.id == fault:
-            grouped.setdefault(result.cell.estimator.id, []).append(result)
+            grouped.setdefault(result.estimator, []).append(result)
     return grouped
 
 
@@ -83,7 +118,7 @@ def by_run(results: Sequence[Result]) -> dict[str, list[Result]]:
     """Results by run, in the suite's order."""
     grouped: dict[str, list[Result]] = {}
     for result in results:
-        grouped.setdefault(result.cell.run.id, []).append(result)
+        grouped.setdefault(result.run, []).append(result)
     return grouped
 
 
@@ -124,18 +159,22 @@ def flat(result: Result) -> dict[str, object]:
     return {**head, **tail, **numbers, **keys}
 
 
+def detailed(result: Result) -> dict[str, object]:
+    """One result with everything that is known of it."""
+    cell, facts = result.cell, result.facts
+    return {
+        **flat(result),
+        "log": cell.run.mcap,
+        "parameters": dict(cell.estimator.params),
+        **{key: facts[key] for key in ("world", "world_hash", "measurements", "warnings", "fates")},
+        "cpu_s": result.cpu_s,
+        "cpu_per_measurement_s": result.cost_s,
+        "versions": {"fusion": fusion.__version__, "numpy": np.__version__, "python": platform.python_version()},
+    }
+
+
 NOT_MEASURED = 3
 """Exit code of a verb that found nothing to judge."""
-
-
-def stored_results(arguments: argparse.Namespace) -> tuple[Suite, list[Result]]:
-    """The suite and its results; raises `SuiteError` while some are missing."""
-    suite, store = opened(arguments)
-    cells = cells_of(suite, store)
-    results = read_results(cells, store)
-    if len(results) < len(cells):
-        refuse_incomplete(suite, len(results), len(cells))
-    return suite, results
 
 
 def refuse_incomplete(suite: Suite, there: int, wanted: int) -> NoReturn:

@@ -47,7 +47,12 @@ def open_run(source: RunSource, folder: Path) -> Run:
     if source.world is not None:
         topics = tuple(sorted(source.topics.items()))
         return _bag(path, state_of(path), folder / source.world, topics, source.truth_to_map)
-    return _read(path, state_of(path))
+    return open_log(path)
+
+
+def open_log(path: Path) -> Run:
+    """The run in a log of ours; the last few are kept open while they do not change. Raises `LogError`."""
+    return _read(path, state_of(path) if path.exists() else ())
 
 
 State = tuple[tuple[str, int, int, int], ...]

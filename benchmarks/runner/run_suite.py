@@ -32,24 +32,38 @@ def run_suite(
     """
     cells = cells_of(suite, store)
     wanted = cells if part is None else shard(cells, *part)
-    open_cells = missing(wanted, store)
-    refuse_impossible(open_cells.estimates)
-    todo = [*open_cells.estimates, *open_cells.scores]
-    for done, one in enumerate(_carried_out(todo, suite, store, workers, dask), start=1):
-        if progress is not None:
-            progress(done, len(todo), f"{one.cell.run.id} {one.cell.estimator.id}")
+    refuse_impossible(missing(wanted, store).estimates)
+    limits = Limits(suite.limits.wall_s, suite.limits.rss_mb)
+    for _ in carry_out_cells(wanted, store, limits, workers=workers, dask=dask, progress=progress):
+        pass
     return read_results(cells, store)
 
 
+def carry_out_cells(
+    cells: Sequence[Cell],
+    store: Store,
+    limits: Limits | None,
+    *,
+    workers: int | None = None,
+    dask: str | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Done]:
+    """Compute what is missing of ``cells``, each answered as it is done."""
+    todo = [one for part in missing(cells, store) for one in part]
+    for count, done in enumerate(_carried_out(todo, store, limits, workers, dask), start=1):
+        if progress is not None:
+            progress(count, len(todo), f"{done.cell.run.id} {done.cell.estimator.id}")
+        yield done
+
+
 def _carried_out(
-    todo: Sequence[Cell], suite: Suite, store: Store, workers: int | None, dask: str | None
+    todo: Sequence[Cell], store: Store, limits: Limits | None, workers: int | None, dask: str | None
 ) -> Iterator[Done]:
     if not todo:
         return iter(())
-    limits = Limits(suite.limits.wall_s, suite.limits.rss_mb)
     if dask is not None:
         from benchmarks.runner.dask_cluster import execute_on_dask
 
-        return execute_on_dask(todo, store, dask, limits)
+        return execute_on_dask(todo, store, dask, limits or Limits())
     count = os.cpu_count() or 1 if workers is None else workers
     return execute(todo, store, workers=min(count, len(todo)), limits=limits)

@@ -92,7 +92,7 @@ def test_replay_keeps_the_metadata_and_adds_the_certificate(log, tmp_path):
 
 def test_replay_and_bench_agree_on_the_digest(log):
     (score,) = bench([log], estimators=["toy_counts"], workers=1, seed=2)
-    assert score.facts["digest"] == replay(log, "toy_counts", seed=2)
+    assert score.digest == replay(log, "toy_counts", seed=2)
 
 
 def test_verification_passes_for_the_same_and_fails_for_another_seed(log, tmp_path):

@@ -135,11 +135,11 @@ def test_process_with_nothing_to_do_ends_and_another_takes_the_next_task():
         assert first != second
 
 
-def test_task_of_a_crew_that_is_dismissed_is_not_lost_but_cancelled(tmp_path):
+def test_task_of_a_pool_that_is_dismissed_is_not_lost_but_cancelled(tmp_path):
     os.mkfifo(tmp_path / "fifo")
-    with ThreadPoolExecutor() as pool, pool_of() as pool:
+    with ThreadPoolExecutor() as threads, pool_of() as pool:
         task = partial(die_once_and_hang, tmp_path / "was-here", tmp_path / "fifo")
-        results = pool.submit(list, pool.compute([task], 1))
+        results = threads.submit(list, pool.compute([task], 1))
         assert (tmp_path / "fifo").read_text(encoding="ascii") == "second try"
         pool.dismiss()
         assert isinstance(results.exception(), CancelledError)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import fusion
-from benchmarks.cell import Cell, score_run
+from benchmarks.review.folding import Reviewed
 from benchmarks.runner.adhoc_suite import bench
 from benchmarks.runner.estimator_run import run_estimator
 from fusion import Truth, World
@@ -164,7 +164,7 @@ def test_a_robot_driven_in_a_world_of_the_docs_is_found(text):
     route = {"waypoints_m": [inside[k] for k in (0, 2, 3, 1, 0)]}
     table = {"world": tomllib.loads(text), "route": route, "reality": {"range_hz": 5.0}}
     run = simulated_run(Scenario.from_table("docs", table), 0)
-    score = score_run(Cell(run.path, "ekf", {}, 0), run, run_estimator(run, "ekf", {}, 0))
+    score = Reviewed.of(run, run_estimator(run, "ekf")).score
     assert score.metrics["pos_rmse"] < 0.3
     assert score.metrics["anees"] < MOST_ANEES
 

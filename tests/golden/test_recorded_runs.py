@@ -15,7 +15,7 @@ def rmse(kind, folder, estimators, output):
     if not (DATA / folder).is_dir():
         pytest.skip(f"the recordings of {folder} are not here")
     scores = bench(import_recordings(kind, DATA / folder, output), estimators=estimators, workers=1)
-    return {(score.run, score.estimator): score.record()["pos_rmse"] for score in scores}
+    return {(score.run, score.estimator): score.metrics["pos_rmse"] for score in scores}
 
 
 def test_labyrinth_agrees_with_its_reference(tmp_path):

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import fusion
-from benchmarks.cell import Cell, score_run
+from benchmarks.review.folding import Reviewed
 from benchmarks.review.particle_clouds import CloudWatch
 from benchmarks.review.scene import write_scene
 from benchmarks.runner.estimator_run import EstimatorRun
@@ -80,7 +80,7 @@ def watched(run: Run) -> CloudWatch:
     return watch
 
 
-def made_up_run(run: Run, number: int) -> EstimatorRun:
+def made_up_run(run: Run, number: int) -> Reviewed:
     """Half a metre beside the truth; every twentieth reading is rejected."""
     covariance, updates = Covariance(0.25, 0.05, 0.0, 0.25, 0.0, 0.01), []
     for k, measurement in enumerate(run.measurements):
@@ -97,18 +97,15 @@ def made_up_run(run: Run, number: int) -> EstimatorRun:
             )
         updates.append(Update(measurement, Estimate(measurement.time_ns, pose, covariance), fates))
     clouds = watched(run).clouds() if number < WITH_PARTICLES else None
-    return EstimatorRun(f"estimator {number}", tuple(updates), "", 0.0, None, clouds=clouds)
+    return Reviewed.of(run, EstimatorRun(f"estimator {number}", tuple(updates)), clouds)
 
 
 def cost_s(poses: int, estimators: int, output: Path) -> float:
     """Processor seconds of the writing alone."""
     run = long_run(poses)
-    estimator_runs = [made_up_run(run, number) for number in range(estimators)]
-    scores = [
-        score_run(Cell(run.path, estimator_run.name, {}, 0), run, estimator_run) for estimator_run in estimator_runs
-    ]
+    reviewed = [made_up_run(run, number) for number in range(estimators)]
     started_s = time.process_time()
-    write_scene(output, run, estimator_runs, scores)
+    write_scene(output, run, reviewed)
     return time.process_time() - started_s
 
 

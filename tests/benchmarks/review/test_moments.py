@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fusion
-from benchmarks.cell import Cell, score_run
 from benchmarks.review.drawing import drawings
 from benchmarks.review.error_causes import Growth
+from benchmarks.review.folding import Reviewed
 from benchmarks.review.moments import SPACING_S, Moment, peaks, worst_moments
 from benchmarks.runner.estimator_run import EstimatorRun
 from benchmarks.runner.review_command import review_command
@@ -82,9 +82,7 @@ def moment_of(tmp_path, judge, *, odometry=lambda _: True, off_m=lambda *_: 0.0,
     measurements = tuple(update.measurement for update in updates)
     track = TruthTrack.from_truths(truth)
     run = Run(tmp_path / "a run.mcap", "run", WORLD, None, {}, measurements, track, (), {})
-    estimator_run = EstimatorRun("toy", tuple(updates), "", 0.0, None)
-    score = score_run(Cell(run.path, "toy", {}, 0), run, estimator_run)
-    (drawing,) = drawings(run, [estimator_run], [score])
+    (drawing,) = drawings(run, [Reviewed.of(run, EstimatorRun("toy", tuple(updates)))])
     (moment,) = worst_moments(run, drawing, 0, 1)
     return moment
 
@@ -129,8 +127,7 @@ def one_anchor_at_a_time(tmp_path, truth):
     run = Run(
         tmp_path, "r", WORLD, None, {}, tuple(u.measurement for u in updates), TruthTrack.from_truths(truth), (), {}
     )
-    estimator_run = EstimatorRun("toy", tuple(updates), "", 0.0, None)
-    (drawing,) = drawings(run, [estimator_run], [score_run(Cell(run.path, "toy", {}, 0), run, estimator_run)])
+    (drawing,) = drawings(run, [Reviewed.of(run, EstimatorRun("toy", tuple(updates)))])
     return worst_moments(run, drawing, 0, 1)[0]
 
 
@@ -177,8 +174,7 @@ def test_command_can_be_pasted_and_names_parameters_and_a_seed_that_matters(tmp_
 def test_lane_that_crashed_has_no_moments(tmp_path):
     track = TruthTrack.from_truths([Truth(0, 0.0, 0.0, 0.0)])
     run = Run(tmp_path, "r", WORLD, None, {}, (), track, (), {})
-    estimator_run = EstimatorRun("toy", (), "", 0.0, "on purpose")
-    (drawing,) = drawings(run, [estimator_run], [score_run(Cell(run.path, "toy", {}, 0), run, estimator_run)])
+    (drawing,) = drawings(run, [Reviewed.of(run, EstimatorRun("toy", error="on purpose"))])
     assert worst_moments(run, drawing, 0, 3) == []
     assert worst_moments(run, dataclasses.replace(drawing, instants=None), 0, 3) == []
 

@@ -32,7 +32,7 @@ def excused():
 
 
 @pytest.mark.viewer
-def test_review_with_a_ghost_is_drawn_by_the_real_viewer(log, tmp_path):
+def test_review_with_a_counterfactual_is_drawn_by_the_real_viewer(log, tmp_path):
     image = tmp_path / "new folder" / "review.png"
     with excused():
         review(log, estimators=["dead_reckoning", "ekf"], png=image, at_s=5.0, without=["ap1"])

@@ -48,8 +48,7 @@ def folded(run, names):
 
 
 def drawn(run, names):
-    estimator_runs, scores = folded(run, names)
-    return figure(run, drawings(run, estimator_runs, scores))
+    return figure(run, drawings(run, folded(run, names)))
 
 
 def lines(axes, colour):
@@ -58,10 +57,10 @@ def lines(axes, colour):
 
 def test_each_estimator_has_a_floor_with_its_track_the_truth_and_the_anchors(run):
     pytest.importorskip("matplotlib")
-    estimator_runs, scores = folded(run, NAMES)
-    *maps, _ = figure(run, drawings(run, estimator_runs, scores)).axes
+    reviewed = folded(run, NAMES)
+    *maps, _ = figure(run, drawings(run, reviewed)).axes
     assert len(maps) == len(NAMES)
-    for axes, drawing in zip(maps, drawings(run, estimator_runs, scores), strict=True):
+    for axes, drawing in zip(maps, drawings(run, reviewed), strict=True):
         p75_cm = 100.0 * drawing.score.metrics["pos_p75"]
         assert axes.get_title() == f"{drawing.name}: 75 % of errors below {p75_cm:.1f} cm"
         (track,), (truth,) = lines(axes, drawing.colour), lines(axes, TRUTH)
@@ -74,9 +73,9 @@ def test_each_estimator_has_a_floor_with_its_track_the_truth_and_the_anchors(run
 def test_errors_over_time_are_those_of_the_bench(run, log):
     pytest.importorskip("matplotlib")
     axes = drawn(run, NAMES).axes[-1]
-    for score in bench([log], estimators=NAMES, workers=1):
-        (line,) = lines(axes, colour_of(score.estimator))
-        assert np.allclose(line.get_ydata(), score.errors.position)
+    for result in bench([log], estimators=NAMES, workers=1):
+        (line,) = lines(axes, colour_of(result.estimator))
+        assert np.sqrt(np.mean(line.get_ydata() ** 2)) == pytest.approx(result.metrics["pos_rmse"])
         assert 0.0 <= line.get_xdata()[0] < 1.0
 
 
@@ -98,15 +97,13 @@ def test_run_without_truth_and_estimator_that_crashed_are_drawn_as_far_as_they_g
         floor, errors = drawn(run, ["broken"]).axes
         assert floor.get_title() == "broken: crashed"
         assert not errors.lines
-        draw_plainly(run, *folded(run, ["broken"]), tmp_path / "broken.png")
+        draw_plainly(run, folded(run, ["broken"]), tmp_path / "broken.png")
 
 
 def test_file_is_the_same_picture_each_time(run, tmp_path):
     pytest.importorskip("matplotlib")
-    estimator_runs, scores = folded(run, NAMES)
-    first, second = (
-        draw_plainly(run, estimator_runs, scores, tmp_path / name).read_bytes() for name in ("1.png", "2.png")
-    )
+    reviewed = folded(run, NAMES)
+    first, second = (draw_plainly(run, reviewed, tmp_path / name).read_bytes() for name in ("1.png", "2.png"))
     assert first == second
     width, height = struct.unpack(">II", first[16:24])
     assert width > 1000 < 2 * height
@@ -115,4 +112,4 @@ def test_file_is_the_same_picture_each_time(run, tmp_path):
 def test_without_matplotlib_the_remedy_is_named(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(FusionError, match=r"pip install 'fusion-localization\[plots\]'"):
-        draw_plainly(run, [], [], tmp_path / "review.png")
+        draw_plainly(run, [], tmp_path / "review.png")

@@ -50,7 +50,7 @@ def test_parameters_are_given_reach_the_estimator_and_stand_in_the_command(log, 
     assert out.endswith(f" --set {word}\n")
 
 
-def test_ghosts_tell_what_the_error_of_a_worst_moment_would_have_been(log, capsys):
+def test_counterfactuals_show_what_the_error_of_a_worst_moment_would_have_been(log, capsys):
     _, out, _ = told(capsys, log, "--estimators", "ekf", "--worst", "1", "--without", "ap1")
     (moment,) = review(log, estimators=["ekf"], worst=1, without=["ap1"]).moments
     assert moment.otherwise["ekf without ap1"] != moment.error_m
@@ -67,7 +67,7 @@ def test_parameters_that_are_none_are_refused(log, capsys, word, told_of):
     assert told_of in err
 
 
-def test_layers_and_ghosts_are_written_and_named(log, tmp_path, capsys):
+def test_layers_and_counterfactuals_are_written_and_named(log, tmp_path, capsys):
     pytest.importorskip("rerun", reason="needs the extra `review`")
     folder = tmp_path / "layers"
     code, out, _ = told(capsys, log, "--estimators", "ekf", "--save", folder, "--without", "ap1", "--reject", "10")

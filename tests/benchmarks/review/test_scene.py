@@ -9,13 +9,13 @@ import pytest
 from scipy.special import gammaincinv
 
 import fusion
-from benchmarks.cell import Cell, score_run
 from benchmarks.review.blueprint import reach
 from benchmarks.review.canvas import MOST_POSES, mostly_jumps, thinned
-from benchmarks.review.counterfactual import counterfactual_run, without_anchor
+from benchmarks.review.counterfactual import without_anchor
 from benchmarks.review.drawing import drawings
 from benchmarks.review.estimator_layer import PARTICLE_PIXELS, newest
 from benchmarks.review.estimator_plots import NEES_BOUNDS
+from benchmarks.review.folding import Reviewed, counterfactual
 from benchmarks.review.particle_clouds import MOST_POINTS, CloudWatch
 from benchmarks.review.scene import markdown, write_scene
 from benchmarks.runner.estimator_run import run_estimator
@@ -112,16 +112,13 @@ def _estimators():
 
 
 def scored(run, names):
-    estimator_runs = [run_estimator(run, name) for name in names]
-    return estimator_runs, [
-        score_run(Cell(run.path, estimator_run.name, {}, 0), run, estimator_run) for estimator_run in estimator_runs
-    ]
+    return [Reviewed.of(run, run_estimator(run, name)) for name in names]
 
 
 def review_of(tmp_path, *names, with_truth=True):
     """The chunks of a review by entity path."""
     run = run_of(tmp_path, with_truth=with_truth)
-    (scene,) = write_scene(tmp_path / "review.rrd", run, *scored(run, names))
+    (scene,) = write_scene(tmp_path / "review.rrd", run, scored(run, names))
     return chunks_of(scene)
 
 
@@ -158,7 +155,7 @@ def test_run_in_unix_time_is_on_a_second_timeline_and_another_is_not(tmp_path):
     moved = [replace(scan, time_ns=scan.time_ns + unix_ns) for scan in since_start.measurements]
     truth = replace(since_start.truth, time_ns=since_start.truth.time_ns + unix_ns)
     run = replace(since_start, measurements=tuple(moved), truth=truth)
-    (scene,) = write_scene(tmp_path / "review.rrd", run, *scored(run, ["toy"]))
+    (scene,) = write_scene(tmp_path / "review.rrd", run, scored(run, ["toy"]))
     (batch,) = [batch for batch in chunks_of(scene)["/rssi/b"] if "t" in batch.schema.names]
     assert batch.column("t")[0].as_py().total_seconds() == 0.0
     assert batch.column("utc").to_numpy(zero_copy_only=False).astype(np.int64).tolist() == [m.time_ns for m in moved]
@@ -168,14 +165,9 @@ def test_run_in_unix_time_is_on_a_second_timeline_and_another_is_not(tmp_path):
 def test_particles_and_their_effective_number_are_drawn_where_an_estimator_shows_them(tmp_path):
     run = run_of(tmp_path)
     watch = CloudWatch(run)
-    estimator_runs = [
-        replace(run_estimator(run, "particle", watch=watch), clouds=watch.clouds()),
-        run_estimator(run, "toy"),
-    ]
-    scores = [
-        score_run(Cell(run.path, estimator_run.name, {}, 0), run, estimator_run) for estimator_run in estimator_runs
-    ]
-    (scene,) = write_scene(tmp_path / "review.rrd", run, estimator_runs, scores)
+    particle = Reviewed.of(run, run_estimator(run, "particle", watch=watch), watch.clouds())
+    reviewed = [particle, *scored(run, ["toy"])]
+    (scene,) = write_scene(tmp_path / "review.rrd", run, reviewed)
     chunks = chunks_of(scene)
     assert not {"/map/estimate/toy/particles", "/neff/toy"} & chunks.keys()
     _, positions = column(chunks, "/map/estimate/particle/particles", "positions")
@@ -199,7 +191,7 @@ def test_true_heading_is_drawn_only_while_it_is_known(tmp_path):
     heading = run.truth.heading.copy()
     heading[[0, 4]] = np.nan
     partly = replace(run, truth=replace(run.truth, heading=heading))
-    (scene,) = write_scene(tmp_path / "review.rrd", partly, *scored(partly, ["toy"]))
+    (scene,) = write_scene(tmp_path / "review.rrd", partly, scored(partly, ["toy"]))
     time, vectors = column(chunks_of(scene), "/map/truth/heading", "vectors")
     assert len(time) == len(heading)
     assert [len(row) for row in vectors] == np.isfinite(heading).astype(int).tolist()
@@ -268,7 +260,7 @@ def test_claim_is_drawn_about_zero_and_the_error_on_it(tmp_path):
 
 def test_plot_of_an_error_has_room_for_the_band_that_is_claimed(tmp_path):
     run = run_of(tmp_path)
-    (drawing,) = drawings(run, *scored(run, ["toy"]))
+    (drawing,) = drawings(run, scored(run, ["toy"]))
     for number, error in ((0, 0.0), (1, 0.5)):
         low, high = reach(drawing, number)
         assert low < -0.2  # the estimator claims a standard deviation of 0.2 m
@@ -323,9 +315,13 @@ def test_states_and_events_stand_at_their_times(tmp_path):
 
 def test_folder_gets_a_base_and_a_layer_for_each_estimator_of_one_recording(tmp_path):
     run = run_of(tmp_path)
-    base, toy, ghost = write_scene(tmp_path / "layers", run, *ghosted(run))
-    assert [file.name for file in (base, toy, ghost)] == ["base.rrd", "toy.rrd", "toy without 02%3A00%3A5e%3A00.rrd"]
-    assert recordings([base, toy, ghost]) == {("fusion", f"test run {WORLD.hash[:12]}")}
+    base, toy, other = write_scene(tmp_path / "layers", run, with_counterfactual(run))
+    assert [file.name for file in (base, toy, other)] == [
+        "base.rrd",
+        "toy.rrd",
+        "toy without 02%3A00%3A5e%3A00.rrd",
+    ]
+    assert recordings([base, toy, other]) == {("fusion", f"test run {WORLD.hash[:12]}")}
     in_base, in_toy = chunks_of(base).keys(), chunks_of(toy).keys()
     assert {"/map/walls", "/map/truth/path", "/rssi/b", "/scores", "/cdf/grid"} <= in_base
     assert "/map/estimate/toy/path" in in_toy
@@ -334,27 +330,25 @@ def test_folder_gets_a_base_and_a_layer_for_each_estimator_of_one_recording(tmp_
 
 def test_layers_together_hold_what_one_file_holds(tmp_path):
     run = run_of(tmp_path)
-    layers = write_scene(tmp_path / "layers", run, *ghosted(run))
-    (single,) = write_scene(tmp_path / "one.rrd", run, *ghosted(run))
+    layers = write_scene(tmp_path / "layers", run, with_counterfactual(run))
+    (single,) = write_scene(tmp_path / "one.rrd", run, with_counterfactual(run))
     assert {path for layer in layers for path in chunks_of(layer)} == set(chunks_of(single))
 
 
-def test_ghost_has_a_track_errors_and_a_row_in_the_table_and_nothing_else(tmp_path):
+def test_counterfactual_has_a_track_errors_and_a_row_in_the_table_and_nothing_else(tmp_path):
     run = run_of(tmp_path)
-    estimator_runs, scores = ghosted(run)
-    *_, ghost = write_scene(tmp_path / "layers", run, estimator_runs, scores)
+    reviewed = with_counterfactual(run)
+    *_, other = write_scene(tmp_path / "layers", run, reviewed)
     name = r"toy\ without\ 02\:00\:5e\:00"
-    own = {path for path in chunks_of(ghost) if not path.startswith("/__")}
+    own = {path for path in chunks_of(other) if not path.startswith("/__")}
     parts = {f"/map/estimate/{name}/{part}" for part in ("path", "trail", "pose", "error")}
     assert own == parts | {f"/{place}/{name}" for place in ("map/legend", "error", "heading_error", "cdf/estimate")}
-    assert "| toy without 02:00:5e:00 |" in markdown(scores)
+    assert "| toy without 02:00:5e:00 |" in markdown(drawings(run, reviewed))
 
 
-def ghosted(run):
-    estimator_runs, scores = scored(run, ["toy"])
+def with_counterfactual(run):
     what_if = without_anchor(run, "02:00:5e:00")
-    ghost = counterfactual_run("toy", {}, what_if, 0)
-    return [*estimator_runs, ghost], [*scores, score_run(Cell(run.path, ghost.name, {}, 0), what_if.run, ghost)]
+    return [*scored(run, ["toy"]), counterfactual("toy", {}, what_if, 0)]
 
 
 def recordings(files):
@@ -377,35 +371,37 @@ def test_estimator_without_answers_and_crashed_one_have_a_legend_and_no_track(tm
 
 
 def test_score_table_ranks_the_live_first_and_tells_the_crash(tmp_path):
-    _, scores = scored(run_of(tmp_path), ["broken", "toy"])
-    lines = markdown(scores).splitlines()
-    assert lines[0].endswith("| age | gaps |")
-    assert lines[2].startswith("| toy | 50.0 |")
-    assert lines[2].endswith(" | 0 |")
-    assert lines[3].startswith("| broken (crashed) |")
+    run = run_of(tmp_path)
+    lines = markdown(drawings(run, scored(run, ["broken", "toy"]))).splitlines()
+    assert lines[2].endswith("| age | gaps |")
+    assert lines[4].startswith("| toy | 50.0 |")
+    assert lines[4].endswith(" | 0 |")
+    assert lines[5].startswith("| broken (crashed) |")
     assert "on purpose" in lines[-1]
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
 def test_full_disk_is_one_error(tmp_path):
     run = run_of(tmp_path)
-    estimator_runs, scores = scored(run, ["toy"])
+    reviewed = scored(run, ["toy"])
     (tmp_path / "review.rrd").symlink_to("/dev/full")
     with pytest.raises(FusionError, match=r"review\.rrd: cannot be written \(No space left on device\)"):
-        write_scene(tmp_path / "review.rrd", run, estimator_runs, scores)
+        write_scene(tmp_path / "review.rrd", run, reviewed)
     (tmp_path / "layers").mkdir()
     (tmp_path / "layers" / "toy.rrd").symlink_to("/dev/full")
     with pytest.raises(FusionError, match=r"toy\.rrd: cannot be written \(No space left on device\)"):
-        write_scene(tmp_path / "layers", run, estimator_runs, scores)
+        write_scene(tmp_path / "layers", run, reviewed)
 
 
 def test_answer_that_is_no_number_is_told_beside_the_table_and_draws_no_error(tmp_path):
     with fusion.registered("poisoned", Poisoned):
-        estimator_runs, scores = scored(run_of(tmp_path), ["poisoned", "toy"])
-    row, told = markdown(scores).splitlines()[3], markdown(scores).splitlines()[-1]
+        run = run_of(tmp_path)
+        reviewed = scored(run, ["poisoned", "toy"])
+    table = markdown(drawings(run, reviewed)).splitlines()
+    row, told = table[5], table[-1]
     assert row.startswith("| poisoned (diverged) | – | – | ∞ |")
     assert told.startswith("poisoned diverged: it answers x nan m, y 0.5 m, heading 0 rad, 2 s after its first answer")
-    (scene,) = write_scene(tmp_path / "review.rrd", run_of(tmp_path), estimator_runs, scores)
+    (scene,) = write_scene(tmp_path / "review.rrd", run_of(tmp_path), reviewed)
     assert "/error/poisoned" not in chunks_of(scene)
     assert "/map/estimate/poisoned/path" in chunks_of(scene)
 
@@ -414,7 +410,7 @@ def test_place_that_cannot_be_written_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     run = run_of(tmp_path)
     with pytest.raises(FusionError, match="give another place"):
-        write_scene(tmp_path / "file" / "review.rrd", run, *scored(run, ["toy"]))
+        write_scene(tmp_path / "file" / "review.rrd", run, scored(run, ["toy"]))
 
 
 def test_every_built_in_has_a_colour_of_its_own_and_a_stranger_always_the_same():

@@ -20,7 +20,7 @@ from benchmarks.runner import reference
 from benchmarks.runner.archive import from_bytes
 from benchmarks.runner.execute import carry_out, faulty_run, stored_track
 from benchmarks.runner.export import as_csv
-from benchmarks.runner.leaderboard import leaderboard
+from benchmarks.runner.leaderboard import suite_leaderboard
 from benchmarks.runner.plan import cells_of, missing, shard
 from benchmarks.runner.preflight import refuse_impossible
 from benchmarks.runner.results import flat, read_results
@@ -132,7 +132,7 @@ def test_scoring_anew_opens_no_run_and_says_the_same(tmp_path, monkeypatch, read
     monkeypatch.setattr("benchmarks.runner.reference.open_run", lambda *_: pytest.fail("the truth is in the store"))
     monkeypatch.setattr("benchmarks.runner.execute.open_run", lambda *_: pytest.fail("the estimates are in the store"))
     reference._read.cache_clear()
-    assert [carry_out((cell, store.folder)) for cell in cells] == [status for _, status, *_ in expected]
+    assert [carry_out((cell, store.folder)).status for cell in cells] == [status for _, status, *_ in expected]
     assert digests(read_results(cells, store)) == expected
 
 
@@ -364,12 +364,12 @@ def test_plan_and_run_tell_what_they_did(suite, tmp_path, capsys):
 
 def test_leaderboard_puts_a_lost_estimator_last_whatever_its_other_cells(suite, tmp_path):
     results = run_suite(suite, Store(tmp_path / "store"), workers=1)
-    best = leaderboard(results).rows[0][0]
+    best = suite_leaderboard(results).rows[0][0]
     spoilt = [
         result._replace(status="crashed") if result.cell.estimator.id == best and result.cell.seed == 0 else result
         for result in results
     ]
-    rows = leaderboard(spoilt).rows
+    rows = suite_leaderboard(spoilt).rows
     assert rows[-1][0] == best
     assert rows[-1][1] == "2/4"
 

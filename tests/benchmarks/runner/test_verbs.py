@@ -10,11 +10,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from benchmarks.cli.suite_arguments import stored_results
 from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.runner.export import as_junit, as_latex
 from benchmarks.runner.gate import Outcome, judge, read_baseline
 from benchmarks.runner.plan import cells_of
-from benchmarks.runner.results import comparison, flat, score_matrix, stored_results
+from benchmarks.runner.results import comparison, flat, score_matrix
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
 from benchmarks.runner.suite import EstimatorSpec, FaultSet, Gate, RunSource, load_suite
