@@ -82,7 +82,7 @@ def with_truth(robot):
 
 def scored(robot, folder):
     """RMSE [m] and ANEES of `ekf` on a whole drive of a robot."""
-    (score,) = bench([virtual_drive(with_truth(robot), folder, 30.0)], estimators=["ekf"], workers=1)
+    (score,) = bench(virtual_drive(with_truth(robot), folder, 30.0), estimators=["ekf"], workers=1)
     assert score.status == "ok"
     return score.metrics["pos_rmse"], score.metrics["anees"]
 

@@ -1,5 +1,8 @@
 """A robot for tests: the simulated one, in a small room."""
 
+import subprocess
+import sys
+
 import pytest
 
 from sensors.onboard.robot_file import RobotFile
@@ -7,12 +10,39 @@ from tests.sensors.robot_files import robot_text
 
 
 @pytest.fixture
-def robot(tmp_path):
-    """Writes a robot file with the options of `robot_text` and reads it."""
+def robot_file(tmp_path):
+    """Writes a robot file with the options of `robot_text`; its path."""
 
     def write(**options):
         path = tmp_path / "trolley.toml"
         path.write_text(robot_text(**options))
-        return RobotFile.load(path)
+        return path
 
     return write
+
+
+@pytest.fixture
+def robot(robot_file):
+    """Writes a robot file with the options of `robot_text` and reads it."""
+    return lambda **options: RobotFile.load(robot_file(**options))
+
+
+@pytest.fixture
+def start_recording(robot_file, tmp_path):
+    """Starts `fusion record` of a robot into ``out``, in a process of its own, and waits until it writes: with the
+    first status line all sensors are open and the log is begun.
+    """
+    processes = []
+
+    def start(*words, **options):
+        places = [str(robot_file(**options)), "-o", str(tmp_path / "out")]
+        command = [sys.executable, "-m", "fusion.cli.main", "record", *places, *words]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        processes.append(process)
+        process.stderr.readline()
+        return process
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()

@@ -12,8 +12,10 @@ STEP_S = 0.01
 START_NS = 5_000_000_000
 
 
-def virtual_drive(robot, folder, duration_s):
-    """The log of a robot whose sensors are all simulated, after so many seconds on its own clock."""
+def virtual_drive(robot, folder, duration_s, *, after_tick=lambda _now_ns: None):
+    """The logs of a robot whose sensors are all simulated, after so many seconds on its own clock; ``after_tick`` is
+    called each time the recorder has taken a batch.
+    """
     clock = VirtualClock(START_NS)
     keepers = [
         Keeper(sensor.name, build_driver(sensor, clock), clock, seed=number)
@@ -24,7 +26,7 @@ def virtual_drive(robot, folder, duration_s):
         while clock.now_ns() < START_NS + duration_s * 1e9:
             received = [one for keeper in keepers for one in keeper.turn(0.0)]
             recorder.take(Turn(clock.now_ns(), received, beat=False, report=None))
+            after_tick(clock.now_ns())
             clock.sleep(STEP_S)
     assert recorder.trouble == ""
-    (path,) = recorder.paths
-    return path
+    return recorder.paths
