@@ -16,7 +16,8 @@ from benchmarks.faults.fault import Fault
 from benchmarks.faults.inject import read_fault
 from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.runner.archive import ARCHIVE_VERSION
-from benchmarks.runner.run_source import Content, content_of, fingerprint
+from benchmarks.runner.fingerprint import fingerprint
+from benchmarks.runner.run_source import Content, content_of
 from benchmarks.runner.store import Store, key_of
 from benchmarks.runner.suite import CLEAN, CellLimits, Contestant, Evaluation, FaultSet, RunSource, Suite
 from fusion import SuiteError
@@ -46,15 +47,14 @@ class Cell(NamedTuple):
 def cells_of(suite: Suite, store: Store) -> list[Cell]:
     """Every cell, run by run, so that each run is opened few times; raises before any work what can be refused."""
     made = {contestant.id: contestant_spec(contestant) for contestant in suite.contestants}
-    for fault in suite.faults:
-        read_faults(fault)
+    code = {fault.id: fault_code(fault) for fault in suite.faults}
     folder, rules = suite.folder, asdict(suite.evaluation)
     cells = []
     for run in suite.runs:
         content = content_of(run, folder, store)
         judged = {"truth": content.truth, "evaluation": rules, "metrics": METRICS_VERSION}
         for fault, contestant, seed in product(suite.faults, suite.contestants, range(suite.seeds)):
-            spec = {**made[contestant.id], **run_spec(suite, run, fault, content), "seed": seed}
+            spec = {**made[contestant.id], **run_spec(suite, run, fault, content, code[fault.id]), "seed": seed}
             key = key_of(spec)
             drawn = (run, contestant, fault, seed, suite.seed, suite.evaluation, suite.limits, folder, content)
             cells.append(Cell(*drawn, key, key_of({"estimate": key, **judged})))
@@ -79,17 +79,28 @@ def contestant_spec(contestant: Contestant) -> dict[str, object]:
     }
 
 
-def run_spec(suite: Suite, run: RunSource, fault: FaultSet, content: Content) -> dict[str, object]:
+def run_spec(suite: Suite, run: RunSource, fault: FaultSet, content: Content, code: Sequence[str]) -> dict[str, object]:
     """What an estimate depends on of the run. Faults are drawn by suite seed and run, never by estimator."""
     if fault.id == CLEAN:
         return {"measured": content.measured}
-    drawn = {"id": fault.id, "apply": [dict(one) for one in fault.apply], "run": run.id, "suite_seed": suite.seed}
+    drawn = {
+        "id": fault.id,
+        "apply": [dict(one) for one in fault.apply],
+        "code": code,
+        "run": run.id,
+        "suite_seed": suite.seed,
+    }
     return {"measured": content.measured, "fault": drawn}
 
 
 def read_faults(faults: FaultSet) -> list[Fault]:
     """The faults of a set; raises `ParameterError` that names the one that is wrong."""
     return [read_fault(table, f"fault {faults.id}: apply[{i}]") for i, table in enumerate(faults.apply)]
+
+
+def fault_code(faults: FaultSet) -> list[str]:
+    """Hashes of the code of a set's faults; raises as `read_faults`."""
+    return sorted({fingerprint(type(fault).__module__) for fault in read_faults(faults)})
 
 
 class Missing(NamedTuple):
