@@ -1,4 +1,4 @@
-"""What every kind of fault has in common: options that mean something, and one thing to do to a run.
+"""The base of every kind of fault: options that are checked, and one change of a run.
 
 Options are checked by their names, which carry their units; a kind may check more.
 """
@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from benchmarks.faults.row_selection import Windows
-from benchmarks.faults.run_columns import Tape
+from benchmarks.faults.run_columns import RunColumns
 from fusion import ParameterError
 from fusion.errors import did_you_mean
 
@@ -27,8 +27,8 @@ class Fault(ABC):
     """Those that ``topic`` may be, for the kinds that have it."""
 
     @abstractmethod
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:
-        """Write the fault into ``tape``. Raises `ParameterError` for a topic or source that the run does not have.
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:
+        """Write the fault into ``columns``. Raises `ParameterError` for a topic or source that the run does not have.
 
         Draws its random numbers for all rows of a topic at once, the same many whatever its options.
         """
@@ -50,12 +50,12 @@ class Fault(ABC):
 
     @property
     def place(self) -> str:
-        """Where it strikes, but not how hard: the name of its random numbers."""
+        """Topic, source and other words among its options, but no numbers: the name of its random stream."""
         return "/".join([self.kind, *(value for value in self.options().values() if isinstance(value, str))])
 
     @property
     def lasts(self) -> Windows:
-        """When it strikes; empty for one that lasts the whole run, or never strikes."""
+        """When it acts; empty for one that lasts the whole run, or never acts."""
         windows: Windows | None = getattr(self, "windows", None)
         return windows or ()
 
@@ -78,4 +78,4 @@ CHECKS: tuple[tuple[tuple[str, ...], Callable[[Any], bool], str], ...] = (
     ),
     (("span",), lambda span: span[0] < span[1], "be [lowest, highest]"),
 )
-"""Names of options, what is allowed, and how to say it."""
+"""Names of options, the values that are allowed, and the words for that."""

@@ -1,9 +1,9 @@
-"""What can go wrong with a recorded run: faults by name, read from a suite and written into a copy of the run.
+"""Faults by name, read from a suite and written into a copy of a run.
 
 Only what was measured is rewritten, and for `BadStart` the start; log, truth and world stay as they are. Every
 estimator meets the same draw: chance comes from the suite's seed, the run, the fault and the seed of the repetition,
 never from the estimator. A second fault leaves the draws of the first as they were; a fault with a greater ``p`` or
-spread strikes what the milder one strikes, and more or harder.
+spread changes what the milder one changes, and more or harder.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from benchmarks.faults.message_faults import Clock, Delay, Drop, GyroDrop
 from benchmarks.faults.motion_faults import BadStart, Freeze, GyroBias, Kidnap, Slip
 from benchmarks.faults.radio_faults import Nlos, Outlier, PowerStep, RssiNoise
 from benchmarks.faults.row_selection import Windows
-from benchmarks.faults.run_columns import Tape
+from benchmarks.faults.run_columns import RunColumns
 from fusion import ParameterError, WorldError
 from fusion.errors import did_you_mean
 from fusion.schema import read_record
@@ -67,27 +67,27 @@ def apply_faults(run: Run, faults: Sequence[Fault], *, suite_seed: int, fault_id
     """``run`` with all ``faults``, which together are called ``fault_id``, in the order given; ``seed`` counts the
     repetitions. Raises `ParameterError` for a topic, source or wheel that the run does not have.
     """
-    return struck(run, faults, suite_seed=suite_seed, fault_id=fault_id, seed=seed).told()
+    return faulty_columns(run, faults, suite_seed=suite_seed, fault_id=fault_id, seed=seed).as_run()
 
 
-def struck(run: Run, faults: Sequence[Fault], *, suite_seed: int, fault_id: str, seed: int) -> Tape:
+def faulty_columns(run: Run, faults: Sequence[Fault], *, suite_seed: int, fault_id: str, seed: int) -> RunColumns:
     """The columns of ``run`` with the faults written into them; of what `apply_faults` does, all that it can refuse."""
-    tape = Tape(run)
-    struck: Counter[str] = Counter()
+    columns = RunColumns(run)
+    applied: Counter[str] = Counter()
     for fault in faults:
         key = fault_seed(suite_seed, run.name, fault_id, seed)
-        own = (*key.spawn_key, stable_hash(fault.place), struck[fault.place])
+        own = (*key.spawn_key, stable_hash(fault.place), applied[fault.place])
         random = np.random.Generator(np.random.PCG64(np.random.SeedSequence(suite_seed, spawn_key=own)))
-        struck[fault.place] += 1
+        applied[fault.place] += 1
         try:
-            fault.strike(tape, random)
+            fault.apply(columns, random)
         except ParameterError as error:
             raise ParameterError(f"fault {fault_id!r} ({fault.kind}) on run {run.name!r}: {error}") from error
-    return tape
+    return columns
 
 
 def outages(faults: Sequence[Fault]) -> Windows:
-    """When any of ``faults`` that do not last the whole run strikes, in order; those that overlap or touch are one."""
+    """When any of ``faults`` that do not last the whole run acts, in order; those that overlap or touch are one."""
     merged: list[tuple[float, float]] = []
     for begin, end in sorted(window for fault in faults for window in fault.lasts):
         if merged and begin <= merged[-1][1]:

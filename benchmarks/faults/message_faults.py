@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.faults.fault import Fault
 from benchmarks.faults.row_selection import TOPICS, Floats, Mask, Windows
-from benchmarks.faults.run_columns import Tape
+from benchmarks.faults.run_columns import RunColumns
 from fusion import ParameterError
 from fusion.values import NANOSECONDS
 
@@ -40,14 +40,14 @@ class Drop(Fault):
         if (self.p_enter is None) != (self.p_exit is None):
             raise ParameterError("p_enter and p_exit: give both for losses in bursts, or neither")
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:
         """Two draws a row: whether it is lost, and whether the channel changes."""
-        rows = tape.rows(self.topic, self.source)
-        struck = rows.select(self.topic, self.source)
-        lost = struck & rows.within(self.windows) & (rows.draw(self.topic, random.random) < self.p)
+        rows = columns.rows(self.topic, self.source)
+        named = rows.select(self.topic, self.source)
+        lost = named & rows.within(self.windows) & (rows.draw(self.topic, random.random) < self.p)
         change = rows.draw(self.topic, random.random)
         if self.p_enter is not None and self.p_exit is not None:
-            lost[struck] &= _bad(change[struck], self.p_enter, self.p_exit)
+            lost[named] &= _bad(change[named], self.p_enter, self.p_exit)
         rows.kept[lost] = False
 
 
@@ -77,12 +77,12 @@ class Delay(Fault):
     source: str = ""
     windows: Windows | None = None
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:
         """One draw a message."""
-        late = tape.messages.select(self.topic, self.source, self.windows)
-        jitter_s = self.jitter_s * tape.messages.draw(self.topic, random.standard_normal)
+        late = columns.messages.select(self.topic, self.source, self.windows)
+        jitter_s = self.jitter_s * columns.messages.draw(self.topic, random.standard_normal)
         delay_s = np.maximum(0.0, self.mean_s + jitter_s[late])
-        tape.arrival_ns[late] += np.rint(delay_s * NANOSECONDS).astype(np.int64)
+        columns.arrival_ns[late] += np.rint(delay_s * NANOSECONDS).astype(np.int64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +98,11 @@ class Clock(Fault):
     offset_s: float = 0.0
     drift_ppm: float = 0.0
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
         """Shift the stamps, and where increments begin, so that they still meet."""
-        device = tape.messages.select(self.topic, self.source)
-        for column in (tape.stamp_ns, tape.from_ns):
-            ahead_ns = self.offset_s * NANOSECONDS + self.drift_ppm * 1e-6 * (column[device] - tape.start_ns)
+        device = columns.messages.select(self.topic, self.source)
+        for column in (columns.stamp_ns, columns.from_ns):
+            ahead_ns = self.offset_s * NANOSECONDS + self.drift_ppm * 1e-6 * (column[device] - columns.start_ns)
             column[device] += np.rint(ahead_ns).astype(np.int64)
 
 
@@ -113,6 +113,6 @@ class GyroDrop(Fault):
     kind: ClassVar[str] = "gyro_drop"
     windows: Windows | None = None
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:
         """As `Drop` does."""
-        Drop("gyro", windows=self.windows).strike(tape, random)
+        Drop("gyro", windows=self.windows).apply(columns, random)

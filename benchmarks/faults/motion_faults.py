@@ -1,4 +1,4 @@
-"""Faults of how the motion is told: wheels that slip or count nothing, a gyro that drifts, a robot carried away."""
+"""Faults of the measured motion: wheels that slip or count nothing, a gyro that drifts, a robot carried away."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from benchmarks.faults.fault import Fault
 from benchmarks.faults.row_selection import Windows
-from benchmarks.faults.run_columns import Tape
+from benchmarks.faults.run_columns import RunColumns
 from fusion import ParameterError, Pose, wrap_angle
 from logs.prior import starting_prior
 
@@ -25,7 +25,7 @@ WHEELS = {
 
 @dataclass(frozen=True, slots=True)
 class Slip(Fault):
-    """A wheel is told to have rolled ``factor`` times as far as it did. ``wheel``: one by name, a side (``left``), or
+    """A wheel counts ``factor`` times as far as it rolled. ``wheel``: one by name, a side (``left``), or
     "" for all; an increment of odometry is taken apart into its wheels and put together again.
     """
 
@@ -34,30 +34,30 @@ class Slip(Fault):
     wheel: str = ""
     windows: Windows | None = None
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
-        """Scale the roll of the wheels that are struck."""
-        struck = tape.messages.select("odom", windows=self.windows)
-        tape.roll[np.ix_(np.flatnonzero(struck), _columns(self.wheel, tape))] *= self.factor
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
+        """Scale the roll of the wheels that slip."""
+        slipping = columns.messages.select("odom", windows=self.windows)
+        columns.roll[np.ix_(np.flatnonzero(slipping), _wheel_indices(self.wheel, columns))] *= self.factor
 
 
 @dataclass(frozen=True, slots=True)
 class Freeze(Fault):
-    """A dead encoder: its wheel is told to stand still. ``wheel`` as in `Slip`."""
+    """A dead encoder: its wheel counts nothing. ``wheel`` as in `Slip`."""
 
     kind: ClassVar[str] = "freeze"
     wheel: str = ""
     windows: Windows | None = None
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:
         """Slip by nothing at all."""
-        Slip(0.0, self.wheel, self.windows).strike(tape, random)
+        Slip(0.0, self.wheel, self.windows).apply(columns, random)
 
 
-def _columns(wheel: str, tape: Tape) -> NDArray[np.int64]:
+def _wheel_indices(wheel: str, columns: RunColumns) -> NDArray[np.int64]:
     """Columns of the wheels whose names hold all words of ``wheel``."""
     if not wheel:
-        return np.arange(tape.roll.shape[1])
-    drive = tape.run.world.robot.drive
+        return np.arange(columns.roll.shape[1])
+    drive = columns.run.world.robot.drive
     found = [set(wheel.split("_")) <= set(name.split("_")) for name in WHEELS[drive]]
     if not any(found):
         known = ", ".join(WHEELS[drive]) or "no wheels"
@@ -73,14 +73,14 @@ class GyroBias(Fault):
     bias_deg_s: float
     windows: Windows | None = None
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
         """Shift the rates."""
-        tape.rate_rad_s[tape.messages.select("gyro", windows=self.windows)] += math.radians(self.bias_deg_s)
+        columns.rate_rad_s[columns.messages.select("gyro", windows=self.windows)] += math.radians(self.bias_deg_s)
 
 
 @dataclass(frozen=True, slots=True)
 class Kidnap(Fault):
-    """The robot is carried off: from ``from_s`` to ``until_s`` wheels and gyro tell of no motion (a gyro at rest reads
+    """The robot is carried off: from ``from_s`` to ``until_s`` wheels and gyro measure no motion (a gyro at rest reads
     the bias that the world states) and radio is silent, while the truth goes on.
     """
 
@@ -93,12 +93,12 @@ class Kidnap(Fault):
         if self.from_s >= self.until_s:
             raise ParameterError(f"until_s: {self.until_s} must be later than from_s, {self.from_s}")
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
         """Stop the wheels and the gyro, and silence the radio."""
-        carried = tape.messages.within(self.lasts)
-        tape.roll[carried] = 0.0
-        tape.rate_rad_s[carried] = tape.run.world.robot.gyro_bias_rad_s
-        tape.messages.kept[carried & np.isin(tape.messages.topic, ("wifi", "ranges"))] = False
+        carried = columns.messages.within(self.lasts)
+        columns.roll[carried] = 0.0
+        columns.rate_rad_s[carried] = columns.run.world.robot.gyro_bias_rad_s
+        columns.messages.kept[carried & np.isin(columns.messages.topic, ("wifi", "ranges"))] = False
 
     @property
     def lasts(self) -> Windows:
@@ -116,9 +116,9 @@ class BadStart(Fault):
     std_m: float = 0.0
     std_deg: float = 0.0
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:
         """Three draws: along x, along y, about the vertical."""
-        prior = tape.prior or starting_prior(tape.run)
+        prior = columns.prior or starting_prior(columns.run)
         dx, dy, turn = (random.standard_normal(3) * (self.std_m, self.std_m, math.radians(self.std_deg))).tolist()
         pose = Pose(prior.pose.x + dx, prior.pose.y + dy, wrap_angle(prior.pose.heading + turn))
-        tape.prior = replace(prior, pose=pose)
+        columns.prior = replace(prior, pose=pose)

@@ -1,4 +1,4 @@
-"""Faults of what a radio hears: noise, a changed transmit power, obstructed links, wild readings."""
+"""Faults of radio readings: noise, a changed transmit power, obstructed links, wild readings."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 from benchmarks.faults.fault import Fault
 from benchmarks.faults.row_selection import Floats, Mask, Windows
-from benchmarks.faults.run_columns import Tape
+from benchmarks.faults.run_columns import RunColumns
 
 RADIO_TOPICS = ("ranges", "wifi")
 RESOLUTIONS_DB = (1.0, 0.5, 0.1)
-"""Steps in which receivers tell signal strengths; a log that keeps to none of them is not rounded."""
+"""Steps in which receivers report signal strengths; a log that keeps to none of them is not rounded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +25,11 @@ class RssiNoise(Fault):
     source: str = ""
     windows: Windows | None = None
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:
         """One draw a reading."""
-        noisy = tape.readings.select("wifi", self.source, self.windows)
-        noise = self.std_db * tape.readings.draw("wifi", random.standard_normal)
-        _tell(tape, "wifi", noisy, tape.value + noise)
+        noisy = columns.readings.select("wifi", self.source, self.windows)
+        noise = self.std_db * columns.readings.draw("wifi", random.standard_normal)
+        _write(columns, "wifi", noisy, columns.value + noise)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +41,9 @@ class PowerStep(Fault):
     step_db: float
     from_s: float = 0.0
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:  # noqa: ARG002 - no chance in it
         """Shift the readings after the step."""
-        tape.value[tape.readings.select("wifi", self.source, ((self.from_s, np.inf),))] += self.step_db
+        columns.value[columns.readings.select("wifi", self.source, ((self.from_s, np.inf),))] += self.step_db
 
     @property
     def lasts(self) -> Windows:
@@ -65,12 +65,12 @@ class Nlos(Fault):
     windows: Windows | None = None
     p: float = 1.0
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:
-        """Two draws a reading: whether it is struck, and how far."""
-        struck = tape.readings.select(self.topic, self.source, self.windows)
-        struck &= tape.readings.draw(self.topic, random.random) < self.p
-        excess = self.mean * tape.readings.draw(self.topic, random.standard_exponential)
-        _tell(tape, self.topic, struck, tape.value + (excess if self.topic == "ranges" else -excess))
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:
+        """Two draws a reading: whether it is changed, and how far."""
+        changed = columns.readings.select(self.topic, self.source, self.windows)
+        changed &= columns.readings.draw(self.topic, random.random) < self.p
+        excess = self.mean * columns.readings.draw(self.topic, random.standard_exponential)
+        _write(columns, self.topic, changed, columns.value + (excess if self.topic == "ranges" else -excess))
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,21 +85,23 @@ class Outlier(Fault):
     source: str = ""
     windows: Windows | None = None
 
-    def strike(self, tape: Tape, random: np.random.Generator) -> None:
-        """Two draws a reading: whether it is struck, and its new value."""
-        struck = tape.readings.select(self.topic, self.source, self.windows)
-        struck &= tape.readings.draw(self.topic, random.random) < self.p
+    def apply(self, columns: RunColumns, random: np.random.Generator) -> None:
+        """Two draws a reading: whether it is changed, and its new value."""
+        changed = columns.readings.select(self.topic, self.source, self.windows)
+        changed &= columns.readings.draw(self.topic, random.random) < self.p
         lowest, highest = self.span
-        _tell(tape, self.topic, struck, lowest + (highest - lowest) * tape.readings.draw(self.topic, random.random))
+        _write(
+            columns, self.topic, changed, lowest + (highest - lowest) * columns.readings.draw(self.topic, random.random)
+        )
 
 
-def _tell(tape: Tape, topic: str, struck: Mask, value: Floats) -> None:
-    """Write ``value`` where ``struck``, signal strengths in the steps of the log."""
-    step_db = _resolution_db(tape) if topic == "wifi" else None
-    tape.value[struck] = value[struck] if step_db is None else step_db * np.rint(value[struck] / step_db)
+def _write(columns: RunColumns, topic: str, changed: Mask, value: Floats) -> None:
+    """Write ``value`` where ``changed``, signal strengths in the steps of the log."""
+    step_db = _resolution_db(columns) if topic == "wifi" else None
+    columns.value[changed] = value[changed] if step_db is None else step_db * np.rint(value[changed] / step_db)
 
 
-def _resolution_db(tape: Tape) -> float | None:
+def _resolution_db(columns: RunColumns) -> float | None:
     """The coarsest of `RESOLUTIONS_DB` that all signal strengths of the log are whole multiples of."""
-    strengths = tape.said_value[(tape.readings.topic == "wifi") & np.isfinite(tape.said_value)]
+    strengths = columns.recorded_value[(columns.readings.topic == "wifi") & np.isfinite(columns.recorded_value)]
     return next((step for step in RESOLUTIONS_DB if np.allclose(np.rint(strengths / step), strengths / step)), None)

@@ -24,11 +24,11 @@ TOPICS: dict[type, str] = {
     WifiScan: "wifi",
     Ranges: "ranges",
 }
-"""What a suite calls the measurements of each type: wheels are one topic, told as counts or as increments."""
+"""Topic of the measurements of each type in a suite: wheels are one topic, as counts or as increments."""
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
+class RowSelection:
     """Columns (n,) of messages, or of single readings. ``source``: the sensor of a message, the anchor of a reading."""
 
     topic: NDArray[np.str_]
@@ -39,7 +39,7 @@ class Rows:
     """False: lost; the one column that is written into."""
 
     def sources(self, topic: str) -> list[str]:
-        """Who speaks on ``topic``, sorted."""
+        """Sensors or anchors on ``topic``, sorted."""
         return sorted(map(str, np.unique(self.source[self.topic == topic])))
 
     def within(self, windows: Windows | None) -> Mask:

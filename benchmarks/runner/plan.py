@@ -16,7 +16,8 @@ from benchmarks.faults.fault import Fault
 from benchmarks.faults.inject import read_fault
 from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.runner.archive import ARCHIVE_VERSION
-from benchmarks.runner.run_source import Content, content_of, fingerprint
+from benchmarks.runner.fingerprint import fingerprint
+from benchmarks.runner.run_source import Content, content_of
 from benchmarks.runner.store import Store, key_of
 from benchmarks.runner.suite import CLEAN, CellLimits, EstimatorSpec, Evaluation, FaultSet, RunSource, Suite
 from fusion import SuiteError
@@ -46,10 +47,9 @@ class Cell(NamedTuple):
 def cells_of(suite: Suite, store: Store) -> list[Cell]:
     """Every cell, run by run, so that each run is opened few times; raises before any work what can be refused."""
     made = {estimator.id: estimator_identity(estimator) for estimator in suite.estimators}
-    for fault in suite.faults:
-        read_faults(fault)
+    code = {fault.id: fault_code(fault) for fault in suite.faults}
     contents = [content_of(run, suite.folder, store) for run in suite.runs]
-    return _cells(suite, contents, made, range(suite.seeds))
+    return _cells(suite, contents, made, code, range(suite.seeds))
 
 
 def unkept_cells(suite: Suite, seed: int) -> list[Cell]:
@@ -58,20 +58,21 @@ def unkept_cells(suite: Suite, seed: int) -> list[Cell]:
     """
     contents = [Content(run.id, run.id) for run in suite.runs]
     made = {estimator.id: {"estimator": estimator.id} for estimator in suite.estimators}
-    return _cells(suite, contents, made, [seed])
+    return _cells(suite, contents, made, {CLEAN: []}, [seed])
 
 
 def _cells(
     suite: Suite,
     contents: Sequence[Content],
     made: Mapping[str, Mapping[str, object]],
+    code: Mapping[str, Sequence[str]],
     seeds: Sequence[int],
 ) -> list[Cell]:
     cells, rules = [], asdict(suite.evaluation)
     for run, content in zip(suite.runs, contents, strict=True):
         judged = {"truth": content.truth, "evaluation": rules, "metrics": METRICS_VERSION}
         for fault, estimator, seed in product(suite.faults, suite.estimators, seeds):
-            spec = {**made[estimator.id], **run_identity(suite, run, fault, content), "seed": seed}
+            spec = {**made[estimator.id], **run_identity(suite, run, fault, content, code[fault.id]), "seed": seed}
             key = key_of(spec)
             drawn = (run, estimator, fault, seed, suite.seed, suite.evaluation, suite.limits, suite.folder, content)
             cells.append(Cell(*drawn, key, key_of({"estimate": key, **judged})))
@@ -96,17 +97,30 @@ def estimator_identity(estimator: EstimatorSpec) -> dict[str, object]:
     }
 
 
-def run_identity(suite: Suite, run: RunSource, fault: FaultSet, content: Content) -> dict[str, object]:
+def run_identity(
+    suite: Suite, run: RunSource, fault: FaultSet, content: Content, code: Sequence[str]
+) -> dict[str, object]:
     """What an estimate depends on of the run. Faults are drawn by suite seed and run, never by estimator."""
     if fault.id == CLEAN:
         return {"measured": content.measured}
-    drawn = {"id": fault.id, "apply": [dict(one) for one in fault.apply], "run": run.id, "suite_seed": suite.seed}
+    drawn = {
+        "id": fault.id,
+        "apply": [dict(one) for one in fault.apply],
+        "code": code,
+        "run": run.id,
+        "suite_seed": suite.seed,
+    }
     return {"measured": content.measured, "fault": drawn}
 
 
 def read_faults(faults: FaultSet) -> list[Fault]:
     """The faults of a set; raises `ParameterError` that names the one that is wrong."""
     return [read_fault(table, f"fault {faults.id}: apply[{i}]") for i, table in enumerate(faults.apply)]
+
+
+def fault_code(faults: FaultSet) -> list[str]:
+    """Hashes of the code of a set's faults; raises as `read_faults`."""
+    return sorted({fingerprint(type(fault).__module__) for fault in read_faults(faults)})
 
 
 class Missing(NamedTuple):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import fusion
-from benchmarks.faults.inject import struck
+from benchmarks.faults.inject import faulty_columns
 from benchmarks.runner.plan import Cell, read_faults
 from benchmarks.runner.run_source import open_run, open_world
 from benchmarks.runner.suite import CLEAN, EstimatorSpec
@@ -15,7 +15,7 @@ from fusion import FusionError, ParameterError, SuiteError, World
 
 def refuse_impossible(cells: Sequence[Cell]) -> None:
     """Raise `SuiteError` for parameters that an estimator refuses, in a corner of a grid too, and `ParameterError` for
-    a fault that strikes what its run does not have: a topic, an anchor, a sensor, a wheel.
+    a fault of what its run does not have: a topic, an anchor, a sensor, a wheel.
     """
     _refuse_parameters(cells)
     _refuse_faults(cells)
@@ -56,7 +56,7 @@ def _can_be_built(name: str, world: World) -> bool:
 
 
 def _refuse_faults(cells: Sequence[Cell]) -> None:
-    """Strike every run once with each of its faults."""
+    """Write each fault of a run into it once."""
     for cell in {(cell.run.id, cell.fault.id): cell for cell in cells if cell.fault.id != CLEAN}.values():
         run = replace(open_run(cell.run, cell.folder), name=cell.run.id)
-        struck(run, read_faults(cell.fault), suite_seed=cell.suite_seed, fault_id=cell.fault.id, seed=cell.seed)
+        faulty_columns(run, read_faults(cell.fault), suite_seed=cell.suite_seed, fault_id=cell.fault.id, seed=cell.seed)

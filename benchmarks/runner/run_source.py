@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import replace
-from functools import cache, lru_cache
-from importlib import import_module
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
+from benchmarks.runner.fingerprint import fingerprint
 from benchmarks.runner.store import Store, key_of, to_json
 from benchmarks.runner.suite import RunSource
 from fusion import SuiteError, World
@@ -144,16 +144,3 @@ def content_of_run(run: Run) -> Content:
     for column in () if run.truth is None else (run.truth.time_ns, run.truth.x, run.truth.y, run.truth.heading):
         truth.update(column.tobytes())
     return Content(measured.hexdigest(), "" if run.truth is None else truth.hexdigest())
-
-
-@cache
-def fingerprint(module: str) -> str:
-    """A hash of the sources that ``module`` is made of: of its package, and of `fusion`, on which all others rest."""
-    total = hashlib.sha256()
-    for name in sorted({module.partition(".")[0], "fusion"}):
-        root = Path(str(import_module(name).__file__))
-        paths = sorted(root.parent.rglob("*.py")) if root.name == "__init__.py" else [root]
-        for path in paths:
-            total.update(f"{name}/{path.relative_to(root.parent)}".encode())
-            total.update(path.read_bytes())
-    return total.hexdigest()

@@ -44,7 +44,7 @@ START_NS = RUN.measurements[0].time_ns
 WINDOWS = ((5.0, 9.0), (12.0, 14.0))
 
 
-def struck_by(*faults, run=RUN, suite_seed=20240501, fault_id="f", seed=0):
+def with_faults(*faults, run=RUN, suite_seed=20240501, fault_id="f", seed=0):
     return apply_faults(run, faults, suite_seed=suite_seed, fault_id=fault_id, seed=seed)
 
 
@@ -105,7 +105,7 @@ TABLES = {
 def test_every_kind_can_be_read_and_changes_the_run(kind):
     fault = read_fault({"kind": kind, **TABLES[kind]}, "faults[0]")
     assert (fault.kind, type(fault)) == (kind, KINDS[kind])
-    assert content(struck_by(fault)) != content(RUN)
+    assert content(with_faults(fault)) != content(RUN)
 
 
 @pytest.mark.parametrize(
@@ -151,12 +151,12 @@ def test_table_that_means_nothing_is_refused_with_a_hint(table, told):
 )
 def test_what_the_run_does_not_have_is_refused_with_what_it_has(fault, told):
     with pytest.raises(ParameterError, match=rf"fault 'f' \({fault.kind}\) on run 'office-3': the run has {told}"):
-        struck_by(fault)
+        with_faults(fault)
 
 
 def test_run_without_measurements_has_no_topic():
     with pytest.raises(ParameterError, match="it has no measurements at all"):
-        struck_by(GyroBias(1.0), run=replace(RUN, measurements=()))
+        with_faults(GyroBias(1.0), run=replace(RUN, measurements=()))
 
 
 # --- chance ----------------------------------------------------------------------------------------------------------
@@ -182,11 +182,11 @@ def test_seed_has_the_values_that_every_implementation_must_find():
 
 @pytest.mark.parametrize("fault", CHANCY, ids=lambda fault: fault.place)
 def test_same_seed_is_the_same_draw_and_another_is_another(fault):
-    once = struck_by(fault, seed=4)
-    assert content(struck_by(fault, seed=4)) == content(once)
+    once = with_faults(fault, seed=4)
+    assert content(with_faults(fault, seed=4)) == content(once)
     for other in ({"seed": 5}, {"seed": 4, "suite_seed": 1}, {"seed": 4, "fault_id": "g"}):
-        assert content(struck_by(fault, **other)) != content(once)
-    renamed = struck_by(fault, run=replace(RUN, name="office-4"), seed=4)
+        assert content(with_faults(fault, **other)) != content(once)
+    renamed = with_faults(fault, run=replace(RUN, name="office-4"), seed=4)
     assert (renamed.measurements, renamed.prior) != (once.measurements, once.prior)
 
 
@@ -194,38 +194,38 @@ def test_same_seed_is_the_same_draw_and_another_is_another(fault):
 @pytest.mark.parametrize("first_in_the_list", [True, False])
 def test_second_fault_leaves_the_draws_of_the_first(second, first_in_the_list):
     first = Nlos("ranges", 0.5, p=0.5)
-    both = struck_by(*((first, second) if first_in_the_list else (second, first)))
-    assert values(both, Ranges) == values(struck_by(first), Ranges)
+    both = with_faults(*((first, second) if first_in_the_list else (second, first)))
+    assert values(both, Ranges) == values(with_faults(first), Ranges)
 
 
 def test_lost_messages_leave_the_draws_of_those_that_are_left():
-    noisy = values(struck_by(RssiNoise(2.0)), WifiScan)
-    thinned = values(struck_by(Drop("wifi", p=0.5), Drop("wifi", "ap1", p=0.5), RssiNoise(2.0)), WifiScan)
+    noisy = values(with_faults(RssiNoise(2.0)), WifiScan)
+    thinned = values(with_faults(Drop("wifi", p=0.5), Drop("wifi", "ap1", p=0.5), RssiNoise(2.0)), WifiScan)
     assert 0 < len(thinned) < len(noisy)
     assert thinned.items() <= noisy.items()
 
 
 def test_two_faults_of_one_kind_and_place_draw_apart():
-    twice = struck_by(Drop("gyro", p=0.5), Drop("gyro", p=0.5))
+    twice = with_faults(Drop("gyro", p=0.5), Drop("gyro", p=0.5))
     share = len(of_kind(twice, Gyro)) / len(of_kind(RUN, Gyro))
     assert share == pytest.approx(0.25, abs=0.05)
 
 
 def test_faults_of_different_places_draw_apart():
     """The whole topic and its only sensor; with the same draws, half of the messages would be left."""
-    lost = struck_by(Drop("gyro", p=0.5), Drop("gyro", "gyro", p=0.5))
+    lost = with_faults(Drop("gyro", p=0.5), Drop("gyro", "gyro", p=0.5))
     assert len(of_kind(lost, Gyro)) / len(of_kind(RUN, Gyro)) == pytest.approx(0.25, abs=0.05)
 
 
-def test_more_of_a_fault_strikes_what_less_of_it_strikes():
-    few, many = (set(values(struck_by(Drop("wifi", "ap2", p=p)), WifiScan)) for p in (0.6, 0.2))
+def test_more_of_a_fault_changes_what_less_of_it_changes():
+    few, many = (set(values(with_faults(Drop("wifi", "ap2", p=p)), WifiScan)) for p in (0.6, 0.2))
     assert few < many
 
 
 @pytest.mark.parametrize("seeds", [{"suite_seed": -1}, {"seed": -1}])
 def test_negative_seed_is_refused(seeds):
     with pytest.raises(ParameterError, match="must not be negative"):
-        struck_by(GyroDrop(), **seeds)
+        with_faults(GyroDrop(), **seeds)
 
 
 # --- what stays ------------------------------------------------------------------------------------------------------
@@ -233,19 +233,19 @@ def test_negative_seed_is_refused(seeds):
 
 @pytest.mark.parametrize("run", [RUN, INCREMENTS], ids=lambda run: run.name)
 def test_no_fault_changes_nothing(run):
-    assert content(struck_by(run=run)) == content(run)
+    assert content(with_faults(run=run)) == content(run)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if "windows" in KINDS[kind].__dataclass_fields__])
 @pytest.mark.parametrize("windows", [[], [[1e6, 2e6]]], ids=["none", "past the end"])
 def test_windows_without_messages_change_nothing(kind, windows):
     fault = read_fault({"kind": kind, **TABLES[kind], "windows": windows}, "faults[0]")
-    assert content(struck_by(fault)) == content(RUN)
+    assert content(with_faults(fault)) == content(RUN)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_log_truth_and_world_are_never_touched(kind):
-    faulty = struck_by(read_fault({"kind": kind, **TABLES[kind]}, "faults[0]"))
+    faulty = with_faults(read_fault({"kind": kind, **TABLES[kind]}, "faults[0]"))
     assert faulty.truth is RUN.truth
     assert faulty.world is RUN.world
     changed = {} if kind == "bad_start" else {"prior": RUN.prior}
@@ -273,7 +273,7 @@ TOUCHED = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_other_topics_are_never_touched(kind):
-    faulty = struck_by(read_fault({"kind": kind, **TABLES[kind]}, "faults[0]"))
+    faulty = with_faults(read_fault({"kind": kind, **TABLES[kind]}, "faults[0]"))
     assert others(faulty, TOUCHED[kind]) == others(RUN, TOUCHED[kind])
 
 
@@ -281,7 +281,7 @@ def test_other_topics_are_never_touched(kind):
 def test_messages_outside_the_windows_are_never_touched(kind):
     """Wheel ticks apart: they are sums, so what was lost in a window stays lost."""
     fault = read_fault({"kind": kind, **TABLES[kind], "windows": WINDOWS}, "faults[0]")
-    faulty = struck_by(fault)
+    faulty = with_faults(fault)
     kept = [m for m in RUN.measurements if not is_in(m) and not isinstance(m, WheelTicks)]
     assert [m for m in faulty.measurements if not is_in(m) and not isinstance(m, WheelTicks)] == kept
     assert faulty != RUN
@@ -321,7 +321,7 @@ def short_run():
 @pytest.mark.parametrize("kind", KINDS)
 def test_filter_lives_through_every_fault_and_answers_otherwise_than_without(kind, short_run):
     run, undamaged = short_run
-    faulty = struck_by(read_fault({"kind": kind, **TABLES[kind]}, "faults[0]"), run=run)
+    faulty = with_faults(read_fault({"kind": kind, **TABLES[kind]}, "faults[0]"), run=run)
     estimator_run = run_estimator(faulty, "ekf")
     assert estimator_run.error is None
     assert len(estimator_run.updates) >= len(faulty.measurements) > 0
@@ -332,12 +332,12 @@ def test_filter_lives_through_every_fault_and_answers_otherwise_than_without(kin
 
 
 def test_dropped_topic_is_gone_in_its_windows():
-    assert of_kind(struck_by(Drop("gyro", windows=WINDOWS)), Gyro) == [m for m in of_kind(RUN, Gyro) if not is_in(m)]
-    assert struck_by(GyroDrop(WINDOWS)).measurements == struck_by(Drop("gyro", windows=WINDOWS)).measurements
+    assert of_kind(with_faults(Drop("gyro", windows=WINDOWS)), Gyro) == [m for m in of_kind(RUN, Gyro) if not is_in(m)]
+    assert with_faults(GyroDrop(WINDOWS)).measurements == with_faults(Drop("gyro", windows=WINDOWS)).measurements
 
 
 def test_dropped_anchor_is_gone_and_the_others_are_heard():
-    faulty = struck_by(Drop("wifi", "ap2", windows=((0.0, 9.0),)))
+    faulty = with_faults(Drop("wifi", "ap2", windows=((0.0, 9.0),)))
     for before, after in zip(of_kind(RUN, WifiScan), of_kind(faulty, WifiScan), strict=True):
         expected = tuple(r for r in before.readings if r.anchor != "ap2" or not is_in(before, ((0.0, 9.0),)))
         assert after == replace(before, readings=expected)
@@ -345,30 +345,30 @@ def test_dropped_anchor_is_gone_and_the_others_are_heard():
 
 def test_scan_of_one_anchor_goes_with_it():
     """Every message of the simulated ranging tells of one anchor."""
-    faulty = struck_by(Drop("ranges", "ap1"))
+    faulty = with_faults(Drop("ranges", "ap1"))
     assert of_kind(faulty, Ranges) == [m for m in of_kind(RUN, Ranges) if m.readings[0].anchor != "ap1"]
 
 
 def test_sensor_can_be_dropped_by_its_name():
-    assert of_kind(struck_by(Drop("wifi", "wifi")), WifiScan) == []
+    assert of_kind(with_faults(Drop("wifi", "wifi")), WifiScan) == []
 
 
 def test_scan_that_heard_nothing_is_kept():
     silent = replace(of_kind(RUN, WifiScan)[0], readings=())
     run = replace(RUN, measurements=(*RUN.measurements, replace(silent, time_ns=RUN.measurements[-1].time_ns + 1)))
-    assert struck_by(Drop("wifi", "ap1"), run=run).measurements[-1].readings == ()
+    assert with_faults(Drop("wifi", "ap1"), run=run).measurements[-1].readings == ()
 
 
 def test_share_of_messages_that_are_lost_is_the_probability():
     """Three standard errors of about a thousand messages."""
-    count, left = len(of_kind(RUN, Gyro)), len(of_kind(struck_by(Drop("gyro", p=0.3)), Gyro))
+    count, left = len(of_kind(RUN, Gyro)), len(of_kind(with_faults(Drop("gyro", p=0.3)), Gyro))
     assert abs(left / count - 0.7) < 3.0 * math.sqrt(0.3 * 0.7 / count)
 
 
 def test_burst_losses_are_as_many_and_as_long_as_their_probabilities_say():
     """In the long run the share lost is p_enter / (p_enter + p_exit) = 0.2, the mean burst 1 / p_exit = 4."""
     gyros = [Gyro(nanoseconds(0.01 * i), "gyro", i, 0.0) for i in range(20_000)]
-    faulty = struck_by(Drop("gyro", p_enter=0.0625, p_exit=0.25), run=replace(RUN, measurements=tuple(gyros)))
+    faulty = with_faults(Drop("gyro", p_enter=0.0625, p_exit=0.25), run=replace(RUN, measurements=tuple(gyros)))
     kept = np.array([m.seq for m in faulty.measurements])
     gaps = np.diff(kept) - 1
     assert 1.0 - len(kept) / len(gyros) == pytest.approx(0.2, abs=0.02)
@@ -376,14 +376,14 @@ def test_burst_losses_are_as_many_and_as_long_as_their_probabilities_say():
 
 
 def test_burst_that_never_begins_loses_nothing_and_one_that_never_ends_all_that_follows():
-    assert content(struck_by(Drop("gyro", p_enter=0.0, p_exit=0.5))) == content(RUN)
-    left = [m.seq for m in of_kind(struck_by(Drop("gyro", p_enter=0.02, p_exit=0.0)), Gyro)]
+    assert content(with_faults(Drop("gyro", p_enter=0.0, p_exit=0.5))) == content(RUN)
+    left = [m.seq for m in of_kind(with_faults(Drop("gyro", p_enter=0.02, p_exit=0.0)), Gyro)]
     assert 0 < len(left) < len(of_kind(RUN, Gyro))
     assert left == [m.seq for m in of_kind(RUN, Gyro)][: len(left)]
 
 
 def test_late_messages_keep_their_stamp_and_lose_their_place():
-    faulty = struck_by(Delay("wifi", 0.25))
+    faulty = with_faults(Delay("wifi", 0.25))
     assert Counter(faulty.measurements) == Counter(RUN.measurements)
     for scan in of_kind(RUN, WifiScan)[:-1]:
         before = faulty.measurements[: faulty.measurements.index(scan)]
@@ -391,7 +391,7 @@ def test_late_messages_keep_their_stamp_and_lose_their_place():
 
 
 def test_jitter_lets_messages_overtake_one_another_but_never_come_early():
-    faulty = struck_by(Delay("gyro", 0.05, 0.1))
+    faulty = with_faults(Delay("gyro", 0.05, 0.1))
     stamps = [m.time_ns for m in of_kind(faulty, Gyro)]
     assert stamps != sorted(stamps)
     place = {m: i for i, m in enumerate(faulty.measurements)}
@@ -401,7 +401,7 @@ def test_jitter_lets_messages_overtake_one_another_but_never_come_early():
 
 
 def test_wrong_clock_shifts_stamps_and_not_the_order_of_arrival():
-    faulty = struck_by(Clock("wifi", "wifi", offset_s=0.5, drift_ppm=1000.0))
+    faulty = with_faults(Clock("wifi", "wifi", offset_s=0.5, drift_ppm=1000.0))
     for before, after in zip(RUN.measurements, faulty.measurements, strict=True):
         elapsed_ns = before.time_ns - START_NS
         ahead_ns = nanoseconds(0.5) + round(1e-3 * elapsed_ns) if isinstance(before, WifiScan) else 0
@@ -409,13 +409,13 @@ def test_wrong_clock_shifts_stamps_and_not_the_order_of_arrival():
 
 
 def test_wrong_clock_leaves_the_true_stamps_with_the_run():
-    faulty = struck_by(Clock("wifi", offset_s=0.5), Clock("wifi", offset_s=0.2))
+    faulty = with_faults(Clock("wifi", offset_s=0.5), Clock("wifi", offset_s=0.2))
     assert set(faulty.true_stamps) == {order(m) for m in of_kind(faulty, WifiScan)}
     assert [faulty.true_stamps[order(m)] for m in of_kind(faulty, WifiScan)] == [
         m.time_ns for m in of_kind(RUN, WifiScan)
     ]
-    assert struck_by(Drop("gyro"), run=faulty).true_stamps == faulty.true_stamps
-    assert struck_by(Delay("wifi", 0.3)).true_stamps == {}
+    assert with_faults(Drop("gyro"), run=faulty).true_stamps == faulty.true_stamps
+    assert with_faults(Delay("wifi", 0.3)).true_stamps == {}
 
 
 @pytest.mark.parametrize(
@@ -425,7 +425,7 @@ def test_score_is_that_of_the_clean_run_for_who_ignores_the_sensor_with_the_wron
     """Odometry alone, its turns from the wheels: answers are as many, as early and as good, whatever clock is wrong."""
     run = replace(RUN, world=replace(RUN.world, robot=replace(RUN.world.robot, turn_source="wheels")))
     clean, faulty = (
-        run_estimator(told, "dead_reckoning") for told in (run, struck_by(Clock(topic, offset_s=offset_s), run=run))
+        run_estimator(told, "dead_reckoning") for told in (run, with_faults(Clock(topic, offset_s=offset_s), run=run))
     )
     instants = evaluation_instants(run.truth)
     expected, got = (errors(instants, match(instants, estimator_run.track)) for estimator_run in (clean, faulty))
@@ -436,13 +436,13 @@ def test_score_is_that_of_the_clean_run_for_who_ignores_the_sensor_with_the_wron
 
 
 def test_increments_still_meet_under_a_wrong_clock():
-    odometry = of_kind(struck_by(Clock("odom", offset_s=0.1, drift_ppm=-123.0), run=INCREMENTS), Odometry)
+    odometry = of_kind(with_faults(Clock("odom", offset_s=0.1, drift_ppm=-123.0), run=INCREMENTS), Odometry)
     assert odometry[0].from_ns == nanoseconds(0.1)
     assert all(one.time_ns == other.from_ns for one, other in itertools.pairwise(odometry))
 
 
 def test_windows_keep_to_the_true_time_whatever_the_clock_says():
-    shifted = struck_by(Clock("gyro", offset_s=3.0), GyroDrop(WINDOWS))
+    shifted = with_faults(Clock("gyro", offset_s=3.0), GyroDrop(WINDOWS))
     assert [m.seq for m in of_kind(shifted, Gyro)] == [m.seq for m in of_kind(RUN, Gyro) if not is_in(m)]
 
 
@@ -450,14 +450,14 @@ def test_windows_keep_to_the_true_time_whatever_the_clock_says():
 
 
 def test_noise_has_the_spread_asked_for():
-    before, after = values(RUN, WifiScan), values(struck_by(RssiNoise(3.0)), WifiScan)
+    before, after = values(RUN, WifiScan), values(with_faults(RssiNoise(3.0)), WifiScan)
     noise = np.array([after[key] - value for key, value in before.items()])
     assert noise.std() == pytest.approx(3.0, rel=0.15)
     assert abs(noise.mean()) < 3.0 * 3.0 / math.sqrt(len(noise))
 
 
 def test_noise_of_one_anchor_leaves_the_others():
-    before, after = values(RUN, WifiScan), values(struck_by(RssiNoise(3.0, "ap1")), WifiScan)
+    before, after = values(RUN, WifiScan), values(with_faults(RssiNoise(3.0, "ap1")), WifiScan)
     assert {anchor for (_, anchor), value in after.items() if value != before[_, anchor]} == {"ap1"}
 
 
@@ -475,15 +475,15 @@ def in_steps(step):
 @pytest.mark.parametrize("fault", [RssiNoise(3.0), Nlos("wifi", 5.0), Outlier("wifi", 0.5, (-90.0, -30.0))])
 def test_noisy_strengths_are_as_coarse_as_those_of_the_log(fault):
     for step in (1.0, 0.5):
-        after = np.array(list(values(struck_by(fault, run=in_steps(step)), WifiScan).values()))
+        after = np.array(list(values(with_faults(fault, run=in_steps(step)), WifiScan).values()))
         assert (after / step == np.rint(after / step)).all()
         assert not (after / (2.0 * step) == np.rint(after / (2.0 * step))).all()
-    fine = np.array(list(values(struck_by(fault, run=in_steps(None)), WifiScan).values()))
+    fine = np.array(list(values(with_faults(fault, run=in_steps(None)), WifiScan).values()))
     assert not (fine == np.round(fine, 1)).any()
 
 
 def test_power_step_is_a_constant_from_its_time_on():
-    before, after = of_kind(RUN, WifiScan), of_kind(struck_by(PowerStep("ap2", -6.0, 7.0)), WifiScan)
+    before, after = of_kind(RUN, WifiScan), of_kind(with_faults(PowerStep("ap2", -6.0, 7.0)), WifiScan)
     for one, other in zip(before, after, strict=True):
         step = -6.0 if not is_in(one, ((0.0, 7.0),)) else 0.0
         expected = tuple(r._replace(rssi_dbm=r.rssi_dbm + step * (r.anchor == "ap2")) for r in one.readings)
@@ -491,21 +491,21 @@ def test_power_step_is_a_constant_from_its_time_on():
 
 
 def test_detour_makes_ranges_longer_only():
-    before, after = values(RUN, Ranges), values(struck_by(Nlos("ranges", 0.8)), Ranges)
+    before, after = values(RUN, Ranges), values(with_faults(Nlos("ranges", 0.8)), Ranges)
     excess = np.array([after[key] - value for key, value in before.items()])
     assert excess.min() > 0.0
     assert excess.mean() == pytest.approx(0.8, abs=3.0 * 0.8 / math.sqrt(len(excess)))
 
 
-def test_obstruction_makes_strengths_weaker_and_strikes_its_share():
-    before, after = values(RUN, WifiScan), values(struck_by(Nlos("wifi", 6.0, p=0.4)), WifiScan)
+def test_obstruction_makes_strengths_weaker_and_changes_its_share():
+    before, after = values(RUN, WifiScan), values(with_faults(Nlos("wifi", 6.0, p=0.4)), WifiScan)
     loss = np.array([value - after[key] for key, value in before.items()])
     assert loss.min() == 0.0
     assert np.mean(loss > 0.0) == pytest.approx(0.4, abs=3.0 * math.sqrt(0.24 / len(loss)))
 
 
 def test_outliers_lie_in_their_span():
-    before, after = values(RUN, Ranges), values(struck_by(Outlier("ranges", 0.5, (100.0, 200.0))), Ranges)
+    before, after = values(RUN, Ranges), values(with_faults(Outlier("ranges", 0.5, (100.0, 200.0))), Ranges)
     wild = [value for key, value in after.items() if value != before[key]]
     assert 0.0 < len(wild) < len(before)
     assert 100.0 <= min(wild) < 120.0
@@ -514,7 +514,7 @@ def test_outliers_lie_in_their_span():
 
 def test_reading_keeps_what_a_fault_does_not_change():
     scan = WifiScan(nanoseconds(1.0), "wifi", 0, (RssiReading("ap1", -50.0, 7), RssiReading("ap2", math.nan)))
-    faulty = struck_by(PowerStep("ap1", 2.0), run=replace(RUN, measurements=(scan,))).measurements[0]
+    faulty = with_faults(PowerStep("ap1", 2.0), run=replace(RUN, measurements=(scan,))).measurements[0]
     assert faulty.readings == (RssiReading("ap1", -48.0, 7), scan.readings[1])
 
 
@@ -531,26 +531,26 @@ STEP_IN = np.array([is_in(m) for m in of_kind(RUN, WheelTicks)][1:])
 def test_frozen_wheel_counts_nothing_in_its_windows_and_goes_on_after():
     expected = steps(RUN)
     expected[STEP_IN, 1] = 0
-    assert (steps(struck_by(Freeze("front_right", WINDOWS))) == expected).all()
+    assert (steps(with_faults(Freeze("front_right", WINDOWS))) == expected).all()
     assert expected[~STEP_IN].sum() < steps(RUN).sum()
 
 
 def test_slipping_side_counts_more_and_no_tick_is_lost_in_rounding():
     """Sums of whole ticks: they are never further from the scaled sum than half a tick."""
-    faulty = np.array([m.counts for m in of_kind(struck_by(Slip(1.37, "left")), WheelTicks)])
+    faulty = np.array([m.counts for m in of_kind(with_faults(Slip(1.37, "left")), WheelTicks)])
     counted = np.array([m.counts for m in of_kind(RUN, WheelTicks)])
     assert np.abs(faulty[:, [0, 2]] - counted[0, [0, 2]] - 1.37 * (counted - counted[0])[:, [0, 2]]).max() <= 0.5
     assert (faulty[:, [1, 3]] == counted[:, [1, 3]]).all()
-    assert all(isinstance(count, int) for m in of_kind(struck_by(Slip(1.37)), WheelTicks) for count in m.counts)
+    assert all(isinstance(count, int) for m in of_kind(with_faults(Slip(1.37)), WheelTicks) for count in m.counts)
 
 
 def test_slip_of_a_wheel_that_is_dead_is_nothing():
-    assert (steps(struck_by(Freeze(windows=WINDOWS), Slip(3.0, windows=WINDOWS)))[STEP_IN] == 0).all()
+    assert (steps(with_faults(Freeze(windows=WINDOWS), Slip(3.0, windows=WINDOWS)))[STEP_IN] == 0).all()
 
 
 def test_ticks_that_were_lost_still_slipped():
-    whole = {m.seq: m for m in of_kind(struck_by(Slip(1.3)), WheelTicks)}
-    thinned = of_kind(struck_by(Drop("odom", p=0.5), Slip(1.3)), WheelTicks)
+    whole = {m.seq: m for m in of_kind(with_faults(Slip(1.3)), WheelTicks)}
+    thinned = of_kind(with_faults(Drop("odom", p=0.5), Slip(1.3)), WheelTicks)
     assert 0 < len(thinned) < len(whole)
     assert all(whole[m.seq] == m for m in thinned)
 
@@ -558,9 +558,9 @@ def test_ticks_that_were_lost_still_slipped():
 def test_increment_slips_as_the_wheels_it_was_made_of_would():
     """Left 0.10 m and right 0.12 m at a track of 0.15 m; the left side at half."""
     odometry = Odometry(nanoseconds(1.0), "wheels", 0, 0, 0.11, 0.02 / 0.15)
-    (half,) = struck_by(Slip(0.5, "left"), run=replace(RUN, measurements=(odometry,))).measurements
+    (half,) = with_faults(Slip(0.5, "left"), run=replace(RUN, measurements=(odometry,))).measurements
     assert (half.distance_m, half.turn_rad) == pytest.approx((0.085, 0.07 / 0.15))
-    (one_of_two,) = struck_by(Slip(0.5, "rear_left"), run=replace(RUN, measurements=(odometry,))).measurements
+    (one_of_two,) = with_faults(Slip(0.5, "rear_left"), run=replace(RUN, measurements=(odometry,))).measurements
     assert one_of_two.distance_m == pytest.approx(0.5 * (0.075 + 0.12))
 
 
@@ -571,20 +571,20 @@ def test_wheels_have_names_in_the_order_of_the_world():
 def test_increments_of_a_robot_without_wheels_slip_as_a_whole():
     world = replace(RUN.world, robot=replace(RUN.world.robot, drive="none"))
     run = replace(INCREMENTS, world=world)
-    for before, after in zip(of_kind(run, Odometry), of_kind(struck_by(Slip(0.5), run=run), Odometry), strict=True):
+    for before, after in zip(of_kind(run, Odometry), of_kind(with_faults(Slip(0.5), run=run), Odometry), strict=True):
         assert (after.distance_m, after.turn_rad) == pytest.approx((0.5 * before.distance_m, 0.5 * before.turn_rad))
     with pytest.raises(ParameterError, match="its none drive has no wheels"):
-        struck_by(Slip(0.5, "left"), run=run)
+        with_faults(Slip(0.5, "left"), run=run)
 
 
 def test_ticks_of_other_wheels_than_the_world_has_are_refused():
     world = replace(RUN.world, robot=replace(RUN.world.robot, drive="differential"))
     with pytest.raises(MeasurementError, match="'encoders' does not count 2 wheels"):
-        struck_by(Slip(0.5), run=replace(RUN, world=world))
+        with_faults(Slip(0.5), run=replace(RUN, world=world))
 
 
 def test_gyro_bias_is_added_in_degrees_a_second():
-    for before, after in zip(of_kind(RUN, Gyro), of_kind(struck_by(GyroBias(2.0, WINDOWS)), Gyro), strict=True):
+    for before, after in zip(of_kind(RUN, Gyro), of_kind(with_faults(GyroBias(2.0, WINDOWS)), Gyro), strict=True):
         assert after.rate_rad_s == before.rate_rad_s + math.radians(2.0) * is_in(before)
 
 
@@ -592,7 +592,7 @@ def test_gyro_bias_is_added_in_degrees_a_second():
 def test_kidnapped_robot_measures_no_motion_and_hears_nothing(run):
     start_ns = min(getattr(m, "from_ns", m.time_ns) for m in run.measurements)
     carried = [((5.0, 9.0),), start_ns]
-    faulty = struck_by(Kidnap(5.0, 9.0), run=run)
+    faulty = with_faults(Kidnap(5.0, 9.0), run=run)
     odometer = Odometer(run.world.robot)
     state, moved = odometer.start(start_ns), []
     for measurement in faulty.measurements:
@@ -610,22 +610,22 @@ def test_kidnapped_robot_measures_no_motion_and_hears_nothing(run):
 
 def test_kidnapped_robot_moves_on_as_before():
     after = np.array([m.time_ns >= START_NS + nanoseconds(9.0) for m in of_kind(RUN, WheelTicks)][1:])
-    assert (steps(struck_by(Kidnap(5.0, 9.0)))[after] == steps(RUN)[after]).all()
+    assert (steps(with_faults(Kidnap(5.0, 9.0)))[after] == steps(RUN)[after]).all()
 
 
 def test_bad_start_displaces_the_prior_alone():
-    faulty = struck_by(BadStart(1.0, 20.0))
+    faulty = with_faults(BadStart(1.0, 20.0))
     assert faulty.measurements == RUN.measurements
     assert faulty.prior == replace(RUN.prior, pose=faulty.prior.pose)
     short = replace(RUN, measurements=())
-    poses = [struck_by(BadStart(1.0, 20.0), run=short, seed=seed).prior.pose for seed in range(300)]
+    poses = [with_faults(BadStart(1.0, 20.0), run=short, seed=seed).prior.pose for seed in range(300)]
     off = np.array(poses) - RUN.prior.pose
     assert off.std(axis=0) == pytest.approx([1.0, 1.0, math.radians(20.0)], rel=0.15)
 
 
 def test_bad_start_of_a_run_without_prior_displaces_the_one_it_would_have_had():
     bare = replace(RUN, prior=None)
-    faulty = struck_by(BadStart(1.0), run=bare)
+    faulty = with_faults(BadStart(1.0), run=bare)
     assert faulty.prior == replace(starting_prior(bare), pose=faulty.prior.pose)
     assert faulty.prior.pose != starting_prior(bare).pose
 
