@@ -50,7 +50,7 @@ def test_a_robot_without_noise_is_found_exactly(drive):
 def test_intervals_hold_the_truth_as_often_as_they_say(drive):
     """Wheels 1 % unequal, 3 % wrong, a track 8 % wrong, slip and ticks: 95 % intervals of all three numbers."""
     held = []
-    for seed in range(25):
+    for seed in range(12):
         run = unequal(drive(seed, distance_scale_bias=0.03, track_scale_bias=0.08, slip_std=0.01), 1.01)
         numbers = calibrate_odometry([run]).numbers
         truth = {
@@ -60,20 +60,27 @@ def test_intervals_hold_the_truth_as_often_as_they_say(drive):
             "effective track, m": 1.08 * TRACK,
         }
         held += [numbers[name].holds(value) for name, value in truth.items()]
-    # Four standard deviations below 95 %, if the hundred were independent.
-    assert np.mean(held) >= 0.87
+    # Four standard deviations below 95 %, if the 48 were independent.
+    assert np.mean(held) >= 0.82
 
 
-@settings(max_examples=10)
+@pytest.fixture(scope="module")
+def calibrated(drive):
+    """A drive and what is found from it."""
+    run = drive(distance_scale_bias=0.03, track_scale_bias=0.08)
+    return run, calibrate_odometry([run])
+
+
+@settings(max_examples=5)
 @given(turned=st.floats(-3.0, 3.0), moved=st.floats(-50.0, 50.0))
-def test_turning_and_moving_the_floor_changes_nothing(drive, turned, moved):
-    run = drive(distance_scale_bias=0.03)
+def test_turning_and_moving_the_floor_changes_nothing(calibrated, turned, moved):
+    run, one = calibrated
     truth, (c, s) = run.truth, (math.cos(turned), math.sin(turned))
     other = TruthTrack(
         truth.time_ns, c * truth.x - s * truth.y + moved, s * truth.x + c * truth.y - moved, truth.heading + turned
     )
-    one, two = (calibrate_odometry([each]).fit.roll for each in (run, dataclasses.replace(run, truth=other)))
-    assert two == pytest.approx(one, rel=1e-6)
+    two = calibrate_odometry([dataclasses.replace(run, truth=other)])
+    assert two.fit.roll == pytest.approx(one.fit.roll, rel=1e-6)
 
 
 def test_what_is_fitted_is_what_estimators_get(drive):
@@ -168,9 +175,9 @@ def test_truth_without_headings_is_good_enough(drive):
     assert found.numbers["mean scale"].holds(1.0 / 1.03)
 
 
-def test_segments_are_measured_by_hand_too(drive, tmp_path):
+def test_segments_are_measured_by_hand_too(calibrated, tmp_path):
     """What the truth would say, typed into a file, gives the same calibration."""
-    run = drive(distance_scale_bias=0.03, track_scale_bias=0.08)
+    run, found = calibrated
     told, start = wheels(run), run.measurements[0].time_ns
     rows = ["from_s,until_s,distance_m,turn_rad"]
     for each in find_segments(run, 0, told):
@@ -180,7 +187,7 @@ def test_segments_are_measured_by_hand_too(drive, tmp_path):
     path.write_text("\n".join(rows))
     assert {each.kind for each in read_segments(path, run, 0)} == {STRAIGHT, SPIN}
     blind = dataclasses.replace(run, truth=None)
-    assert calibrate_odometry([blind], path).fit.roll == pytest.approx(calibrate_odometry([run]).fit.roll, rel=1e-6)
+    assert calibrate_odometry([blind], path).fit.roll == pytest.approx(found.fit.roll, rel=1e-6)
 
 
 def test_nothing_is_scored_that_was_fitted(drive):
