@@ -1,8 +1,10 @@
-"""The start of a run and the prior there: one rule for import, inspection and benchmarks.
+"""The start of a run and the prior there: one rule for import, inspection, calibration, benchmarks and review.
 
-In this order: the prior that the log brings; else the true pose where the measurements begin (the last one before that,
-or the first one of all where truth begins later), its heading unknown where the truth has none; else, without truth,
-nothing: position and heading unknown, the pose at the middle of the floor.
+A run starts at the first time that any of its measurements covers (`begin_ns`). Its prior, in this order: the one that
+the log brings; else the true pose at the start (the last one up to it, or the first one of all where truth begins
+later), its heading unknown where the truth has none; else, without truth, nothing: position and heading unknown, the
+moments of a uniform distribution over the floor. An import takes the same true pose, and may find its heading from
+motion; the log keeps that prior.
 """
 
 from __future__ import annotations
@@ -14,75 +16,22 @@ import numpy as np
 
 from fusion import Bounds, Covariance, Increment, Measurement, Odometry, OdometryNoise, Pose, Prior, Truth
 from fusion.belief import UNKNOWN_HEADING_STD
+from fusion.timeline import order
 from fusion.values import NANOSECONDS
-from logs.importers.foreign_recording import _prior
 from logs.run import Run
+from logs.truth import TruthTrack
 
-
-def heading_from_motion(odometry: Sequence[Odometry], truths: Sequence[Truth], path_m: float) -> float | None:
-    """The start heading [rad] with which the first ``path_m`` of odometry follow the truth, or None without motion.
-
-    Closed form: the rotation about the start that minimises the squared distances (2-D Procrustes; Arun et al. 1987).
-    """
-    sine = cosine = 0.0
-    motion, noise, place = Increment(), OdometryNoise(), 0
-    first = truths[0]
-    for step in odometry:
-        motion = motion.extend(step, noise)
-        while place + 1 < len(truths) and truths[place + 1].time_ns <= step.time_ns:
-            place += 1
-        ahead = truths[place]
-        if ahead.time_ns != step.time_ns and step.time_ns - ahead.time_ns > NANOSECONDS:
-            continue
-        dx, dy = ahead.x - first.x, ahead.y - first.y
-        cosine += motion.x * dx + motion.y * dy
-        sine += motion.x * dy - motion.y * dx
-        if motion.path_m >= path_m:
-            break
-    return math.atan2(sine, cosine) if math.hypot(sine, cosine) > 1e-6 else None
-
-
-def prior_from_truth(
-    odometry: Sequence[Odometry], truths: Sequence[Truth], *, path_m: float = 1.0, heading_std: float = 0.2
-) -> tuple[Prior | None, str]:
-    """A starting prior at the first true pose with a position, and a sentence that states how it was made.
-
-    Without a heading there, it is found from the first ``path_m`` of motion, with ``heading_std`` [rad], or unknown.
-    """
-    placed = [truth for truth in truths if truth.position_known]
-    if not placed:
-        return None, "no truth: start unknown"
-    first, heading = placed[0], placed[0].known_heading
-    if heading is not None:
-        return _prior(first, heading, HEADING_STD_RAD), "first true pose, 0.05 m, 0.05 rad"
-    after = [step for step in odometry if step.time_ns > first.time_ns]
-    heading = heading_from_motion(after, placed, path_m)
-    if heading is None:
-        return _prior(first, None, UNKNOWN_HEADING_STD), "first true position, heading unknown"
-    how = f"first true position, heading from the first {path_m:g} m of motion against the truth"
-    return _prior(first, heading, heading_std), how
-
-
-def _start(run: Run) -> Prior:
-    """The log's prior, else the first true pose, else nothing known; not later than the first measurement."""
-    if run.prior is not None:
-        return run.prior
-    begin_ns = min((m.from_ns if isinstance(m, Odometry) else m.time_ns for m in run.measurements), default=0)
-    if run.truth is not None:
-        x, y, heading = (float(column[0]) for column in (run.truth.x, run.truth.y, run.truth.heading))
-        known = None if math.isnan(heading) else heading
-        prior, _ = prior_from_truth([], [Truth(begin_ns, x, y, known)] if math.isfinite(x + y) else [])
-        if prior is not None:
-            return prior
-    floor = run.world.bounds
-    middle = Pose(0.5 * (floor.x_min + floor.x_max), 0.5 * (floor.y_min + floor.y_max), 0.0)
-    wide = Covariance.from_std(floor.x_max - floor.x_min, floor.y_max - floor.y_min, math.pi)
-    return Prior(begin_ns, middle, wide, position_known=False, heading_known=False)
-
-
-POSITION_STD_M = 0.1
-"""How well a pose taken from the truth is said to be known: set down by hand, not to the millimetre."""
+POSITION_STD_M = 0.05
+"""Standard deviation of each coordinate of a start that is taken from the truth: set by hand, not to the millimetre."""
 HEADING_STD_RAD = 0.05
+"""Standard deviation of its heading, where the truth has one; likewise."""
+
+
+def begin_ns(measurements: Iterable[Measurement]) -> int:
+    """The first time that any measurement covers, 0 of none. An increment begins before its own stamp, and must not
+    count twice.
+    """
+    return min((m.from_ns if isinstance(m, Odometry) else m.time_ns for m in measurements), default=0)
 
 
 def starting_prior(run: Run) -> Prior:
@@ -90,31 +39,72 @@ def starting_prior(run: Run) -> Prior:
     if run.prior is not None:
         return run.prior
     start_ns = begin_ns(run.measurements)
-    return _from_truth(run, start_ns) or _unknown(run.world.bounds, start_ns)
+    truth = None if run.truth is None else true_start(run.truth, start_ns)
+    if truth is None:
+        return _unknown(run.world.bounds, start_ns)
+    return _known(truth, truth.known_heading, HEADING_STD_RAD)
 
 
-def begin_ns(measurements: Iterable[Measurement]) -> int:
-    """The first time any measurement tells of: an increment begins before its own stamp, and must not count twice."""
-    return min((m.from_ns if isinstance(m, Odometry) else m.time_ns for m in measurements), default=0)
-
-
-def _from_truth(run: Run, start_ns: int) -> Prior | None:
-    if run.truth is None:
+def true_start(truth: TruthTrack, start_ns: int) -> Truth | None:
+    """The last true pose with a position up to ``start_ns``, or the first of all where truth begins later."""
+    placed = np.flatnonzero(np.isfinite(truth.x) & np.isfinite(truth.y))
+    if len(placed) == 0:
         return None
-    known = np.flatnonzero(np.isfinite(run.truth.x) & np.isfinite(run.truth.y))
-    if len(known) == 0:
-        return None
-    before = known[run.truth.time_ns[known] <= start_ns]
-    first = int(before[-1] if len(before) else known[0])
-    heading = float(run.truth.heading[first])
-    is_known = math.isfinite(heading)
-    heading_std = HEADING_STD_RAD if is_known else UNKNOWN_HEADING_STD
-    return Prior(
-        int(run.truth.time_ns[first]),
-        Pose(float(run.truth.x[first]), float(run.truth.y[first]), heading if is_known else 0.0),
-        Covariance.from_std(POSITION_STD_M, POSITION_STD_M, heading_std),
-        heading_known=is_known,
-    )
+    up_to_start = placed[truth.time_ns[placed] <= start_ns]
+    row = int(up_to_start[-1] if len(up_to_start) else placed[0])
+    heading = float(truth.heading[row])
+    known = heading if math.isfinite(heading) else None
+    return Truth(int(truth.time_ns[row]), float(truth.x[row]), float(truth.y[row]), known)
+
+
+def prior_from_truth(
+    measurements: Sequence[Measurement], truths: Sequence[Truth], *, path_m: float = 1.0, heading_std: float = 0.2
+) -> tuple[Prior | None, str]:
+    """A prior for an import at the true pose where the measurements start, and a sentence that states how it was made.
+
+    Where the truth has no heading there, it is found from the first ``path_m`` of odometry, with ``heading_std`` [rad],
+    or unknown.
+    """
+    track = TruthTrack.from_truths(truths)
+    first = true_start(track, begin_ns(measurements))
+    if first is None:
+        return None, "no truth: start unknown"
+    if first.known_heading is not None:
+        return _known(first, first.known_heading, HEADING_STD_RAD), "first true pose, 0.05 m, 0.05 rad"
+    odometry = sorted((m for m in measurements if isinstance(m, Odometry) and m.time_ns > first.time_ns), key=order)
+    heading = heading_from_motion(odometry, track, first, path_m)
+    if heading is None:
+        return _known(first, None, heading_std), "first true position, heading unknown"
+    how = f"first true position, heading from the first {path_m:g} m of motion against the truth"
+    return _known(first, heading, heading_std), how
+
+
+def heading_from_motion(odometry: Sequence[Odometry], truth: TruthTrack, first: Truth, path_m: float) -> float | None:
+    """The heading [rad] at ``first`` with which the first ``path_m`` of odometry follow the truth, or None without
+    motion.
+
+    Closed form: the rotation about the start that minimises the squared distances (2-D Procrustes; Arun et al. 1987).
+    """
+    sine = cosine = 0.0
+    motion, noise = Increment(), OdometryNoise()
+    newest = np.searchsorted(truth.time_ns, [step.time_ns for step in odometry], side="right") - 1
+    for step, row in zip(odometry, newest.tolist(), strict=True):
+        motion = motion.extend(step, noise)
+        if step.time_ns - int(truth.time_ns[row]) > NANOSECONDS:
+            continue
+        dx, dy = float(truth.x[row]) - first.x, float(truth.y[row]) - first.y
+        cosine += motion.x * dx + motion.y * dy
+        sine += motion.x * dy - motion.y * dx
+        if motion.path_m >= path_m:
+            break
+    return math.atan2(sine, cosine) if math.hypot(sine, cosine) > 1e-6 else None
+
+
+def _known(truth: Truth, heading: float | None, heading_std: float) -> Prior:
+    """The prior at a true position with that heading; None: unknown, whatever ``heading_std``."""
+    spread = UNKNOWN_HEADING_STD if heading is None else heading_std
+    covariance = Covariance.from_std(POSITION_STD_M, POSITION_STD_M, spread)
+    return Prior(truth.time_ns, Pose(truth.x, truth.y, heading or 0.0), covariance, heading_known=heading is not None)
 
 
 def _unknown(floor: Bounds, start_ns: int) -> Prior:

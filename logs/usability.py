@@ -26,7 +26,7 @@ from fusion import (
     WifiScan,
     track,
 )
-from logs.prior import _start
+from logs.prior import starting_prior
 from logs.run import Run
 
 SCANS = 50
@@ -53,7 +53,7 @@ class Usability(NamedTuple):
 
 def usability(run: Run) -> list[Usability]:
     """One per available estimator, by name."""
-    start = _start(run)
+    start = starting_prior(run)
     excerpt = _excerpt(run.measurements)
     return [_judge(name, run, start, excerpt) for name in fusion.available()]
 

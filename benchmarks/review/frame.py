@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from fusion.values import NANOSECONDS, seconds
+from logs.prior import begin_ns
 from logs.run import Run
 
 TIMELINE = "t"
-"""Time since the run's first message."""
+"""Time since the run's start."""
 UTC = "utc"
 """The same as date and time of day, where the stamps tell them."""
 UNIX_SINCE_NS = 1_000_000_000 * NANOSECONDS
@@ -33,17 +34,18 @@ class Frame(NamedTuple):
 
     @classmethod
     def around(cls, run: Run) -> Frame:
-        """The floor with all anchors and the true path, from the first message to the last."""
+        """The floor with all anchors and the true path, from the start of the run to its last message or true pose."""
         bounds, anchors = run.world.bounds, run.world.anchors
         xs = [bounds.x_min, bounds.x_max, *(anchor.x for anchor in anchors)]
         ys = [bounds.y_min, bounds.y_max, *(anchor.y for anchor in anchors)]
-        stamps = [measurement.time_ns for measurement in run.measurements]
+        start_ns = begin_ns(run.measurements)
+        stamps = [start_ns, *(measurement.time_ns for measurement in run.measurements)]
         if run.truth is not None:
             known = np.isfinite(run.truth.x) & np.isfinite(run.truth.y)
             xs += run.truth.x[known].tolist()
             ys += run.truth.y[known].tolist()
             stamps += run.truth.time_ns[known].tolist()
-        return cls(min(xs), max(xs), min(ys), max(ys), min(stamps, default=0), max(stamps, default=0))
+        return cls(min(xs), max(xs), min(ys), max(ys), start_ns, max(stamps))
 
     @property
     def timelines(self) -> tuple[str, ...]:

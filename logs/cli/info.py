@@ -20,6 +20,7 @@ from logs.cli.info_text import info_text
 from logs.devices import complaints, devices, dropped, wall_clock
 from logs.importers.bag import open_bag
 from logs.importers.roles import roles_of
+from logs.prior import begin_ns
 from logs.reader import holds_run, read_log
 from logs.run import Run
 from logs.timing import Stream
@@ -42,7 +43,7 @@ def describe(path: Path) -> dict[str, Any]:
         "world_hash": run.world.hash,
         **_anchors(run),
         "duration_s": _duration_s(run),
-        "channels": _channels(log.arrivals),
+        "channels": _channels(log.arrivals, begin_ns(run.measurements)),
         "truth": 0 if run.truth is None else len(run.truth),
         "true_headings": 0 if run.truth is None else int(np.isfinite(run.truth.heading).sum()),
         "prior": None if run.prior is None else [n if math.isfinite(n) else None for n in run.prior.pose],
@@ -51,7 +52,7 @@ def describe(path: Path) -> dict[str, Any]:
         "estimators": {name: len(estimates) for name, estimates in run.lanes.items()},
         "usability": [verdict.record() for verdict in usability(run)],
         "left_out": left_out(),
-        "wall_clock": wall_clock(run.clocks, _start_ns(log.arrivals)),
+        "wall_clock": wall_clock(run.clocks, begin_ns(run.measurements)),
         "devices": devices(run.remarks),
         "complaints": dict(complaints(run.remarks)),
         "dropped": dropped(run.remarks),
@@ -101,25 +102,20 @@ def _anchors(run: Run) -> dict[str, Any]:
 
 
 def _duration_s(run: Run) -> float:
-    times = [measurement.time_ns for measurement in run.measurements]
-    return seconds(max(times) - min(times)) if times else 0.0
+    start_ns = begin_ns(run.measurements)
+    return seconds(max((measurement.time_ns for measurement in run.measurements), default=start_ns) - start_ns)
 
 
-def _channels(arrivals: Sequence[tuple[int, Measurement]]) -> list[dict[str, Any]]:
+def _channels(arrivals: Sequence[tuple[int, Measurement]], start_ns: int) -> list[dict[str, Any]]:
     """One row per sensor: how much, how often, and what is odd about its times."""
     by_sensor: dict[tuple[str, str], list[tuple[int, int, int]]] = defaultdict(list)
     for log_ns, measurement in arrivals:
         row = (measurement.time_ns, log_ns, measurement.seq)
         by_sensor[type(measurement).__name__, measurement.sensor].append(row)
-    start_ns = _start_ns(arrivals)
     return [
         {"kind": kind, "sensor": sensor, **Stream(*np.array(rows, dtype=np.int64).T).timing(start_ns)}
         for (kind, sensor), rows in sorted(by_sensor.items())
     ]
-
-
-def _start_ns(arrivals: Sequence[tuple[int, Measurement]]) -> int:
-    return min((measurement.time_ns for _, measurement in arrivals), default=0)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

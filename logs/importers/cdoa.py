@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from fusion import Odometry, RecordingError, RssiReading, Truth, WifiScan, World
+from fusion import Measurement, Odometry, RecordingError, RssiReading, Truth, WifiScan, World
 from fusion.values import NANOSECONDS, seconds
 from logs.importers.foreign_recording import Recording, Row, read_table
 from logs.prior import prior_from_truth
@@ -59,12 +59,13 @@ def _recording(path: Path) -> Recording:
         raise RecordingError(f"{path}: no whole row beside the header; give a whole file")
     odometry, truths = _odometry(whole), _truths(whole)
     scans = [scan for i, row in enumerate(whole) if (scan := _scan(i, row)).readings]
-    prior, how = prior_from_truth(odometry, truths, path_m=START_PATH_M)
+    measurements: list[Measurement] = [*odometry, *scans]
+    prior, how = prior_from_truth(measurements, truths, path_m=START_PATH_M)
     about = {"source": "cdoa", "licence": "MIT, HeRoLab UGA", "prior": how}
     if len(whole) < len(rows):
         about["skipped"] = f"{len(rows) - len(whole)} rows cut off or without a number"
     name = f"{path.parent.name}-{path.stem.removeprefix('combined_sync_data_')}"
-    return Recording(name, _world(name), prior, [*odometry, *scans], truths, about)
+    return Recording(name, _world(name), prior, measurements, truths, about)
 
 
 def _world(name: str) -> World:

@@ -31,12 +31,12 @@ def recordings(folder: Path) -> Iterator[Recording]:
     if not (folder / "world.toml").is_file():
         raise RecordingError(f"{folder}: no world.toml; write one (docs/world.md shows every key)")
     world = World.load(folder / "world.toml")
-    odometry = _odometry(folder)
-    measurements: list[Measurement] = [*odometry, *_ticks(folder), *_gyro(folder), *_ranges(folder), *_rssi(folder)]
+    motion: list[Measurement] = [*_odometry(folder), *_ticks(folder), *_gyro(folder)]
+    measurements = [*motion, *_ranges(folder), *_rssi(folder)]
     if not measurements:
         raise RecordingError(f"{folder}: none of odometry.csv, ticks.csv, ranges.csv, rssi.csv has a row; add one")
     truths = _truth(folder)
-    prior, how = prior_from_truth(odometry, truths)
+    prior, how = prior_from_truth(measurements, truths)
     found, about = caution_of_run(world.robot, measurements, ()), {"source": "csv", "prior": how}
     doubts = [f"{folder}: {found}"] if found else []
     yield Recording(folder.resolve().name, world, prior, measurements, truths, about, warnings=doubts)

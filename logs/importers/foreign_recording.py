@@ -9,24 +9,12 @@ from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
-from fusion import (
-    Covariance,
-    Measurement,
-    Pose,
-    Prior,
-    RecordingError,
-    Truth,
-    World,
-)
+from fusion import Measurement, Prior, RecordingError, Truth, World
 from fusion.errors import did_you_mean
 from fusion.timeline import order
 from fusion.values import NANOSECONDS
 from logs.run import left_out
 from logs.writer import RunWriter
-
-POSITION_STD_M = 0.05
-"""How well a start taken from the truth is known."""
-HEADING_STD_RAD = 0.05
 
 
 @dataclass(frozen=True)
@@ -133,8 +121,3 @@ def read_table(path: Path, required: Sequence[str]) -> Iterator[Row]:
                 yield Row(f"{path}:{reader.line_num}", cells)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise RecordingError(f"{path}: cannot be read as CSV ({error})") from error
-
-
-def _prior(first: Truth, heading: float | None, heading_std: float) -> Prior:
-    spread = Covariance.from_std(POSITION_STD_M, POSITION_STD_M, heading_std)
-    return Prior(first.time_ns, Pose(first.x, first.y, heading or 0.0), spread, heading_known=heading is not None)

@@ -47,7 +47,7 @@ def _recording(path: Path, places: Path) -> Recording:
     measurements: list[Ranges | WifiScan] = []
     for i, (time, row) in enumerate(zip(times, rows, strict=True)):
         measurements += _readings(time, i, row, rows[i - 1] if i else None, list(anchors))
-    prior, how = prior_from_truth([], truths)
+    prior, how = prior_from_truth(measurements, truths)
     name = f"{places.stem.removeprefix('AP_idx_')}-{path.parent.name}-{path.stem}"
     table = {
         "name": name,

@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from fusion import Odometry, Pose, RecordingError, RssiReading, Truth, WifiScan, World
+from fusion import Measurement, Odometry, Pose, RecordingError, RssiReading, Truth, WifiScan, World
 from fusion.values import NANOSECONDS, nanoseconds, seconds
 from logs.importers.foreign_recording import Recording, Row, exact_ns, read_table
 from logs.prior import prior_from_truth
@@ -76,12 +76,12 @@ def _recording(path: Path, anchors: Path) -> Recording:
     scans = [scan for i, row in enumerate(rows) if (scan := _scan(i, row)).readings]
     motion = path.with_name(path.name.replace("_df.csv", "_motion.txt"))
     odometry = _odometry(motion, truths[0].time_ns, truths[-1].time_ns) if motion.is_file() else []
-    prior, how = prior_from_truth(odometry, truths)
+    measurements: list[Measurement] = [*odometry, *scans]
+    prior, how = prior_from_truth(measurements, truths)
     name = path.name.removesuffix("_df.csv")
     about = {"source": "kolakowski", "licence": "CC BY 4.0, M. Kolakowski, doi 10.3390/s21186270", "prior": how}
-    return Recording(
-        name, _world(name, anchors, "differential" if odometry else "none"), prior, [*odometry, *scans], truths, about
-    )
+    world = _world(name, anchors, "differential" if odometry else "none")
+    return Recording(name, world, prior, measurements, truths, about)
 
 
 def _time_ns(row: Row) -> int:

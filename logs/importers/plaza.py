@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from fusion import Odometry, RangeReading, Ranges, RecordingError, Truth, World, wrap_angle
+from fusion import Measurement, Odometry, RangeReading, Ranges, RecordingError, Truth, World, wrap_angle
 from fusion.values import nanoseconds
 from logs.importers.foreign_recording import Recording
 from logs.prior import prior_from_truth
@@ -60,7 +60,8 @@ def _recording(path: Path) -> Recording:
         Ranges(nanoseconds(t), "ranging", i, (RangeReading(f"{int(beacon)}", far),))
         for i, (t, _, beacon, far) in enumerate(sorted(tables["TD"]))
     ]
-    prior, how = prior_from_truth(odometry, truths)
+    measurements: list[Measurement] = [*odometry, *ranges]
+    prior, how = prior_from_truth(measurements, truths)
     table = {
         "name": path.stem.strip("_"),
         "provenance": "range scale, offset and noise were measured on Plaza1 (in-sample there)",
@@ -69,4 +70,4 @@ def _recording(path: Path) -> Recording:
         "robot": {"drive": "differential", "noise": NOISE},
     }
     about = {"source": "plaza", "licence": "cite Djugash, Hamner & Roth 2009", "prior": how}
-    return Recording(str(table["name"]), World.from_table(table), prior, [*odometry, *ranges], truths, about)
+    return Recording(str(table["name"]), World.from_table(table), prior, measurements, truths, about)

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TypeAlias, TypeVar
 
-from fusion import Gyro, LogError, Measurement, Odometry, Pose, RangeReading, Ranges, Truth, WifiScan, World
+from fusion import Gyro, LogError, Measurement, Pose, RangeReading, Ranges, Truth, WifiScan, World
 from fusion.errors import ParameterError
 from fusion.timeline import order
 from logs.importers.bag import TRANSFORM_TYPES, Bag, Keep, Topic, open_bag
@@ -118,8 +118,7 @@ def _recording(
     cast: str,
     warnings: Sequence[str],
 ) -> Recording:
-    odometry = sorted((m for _, m in measurements if isinstance(m, Odometry)), key=order)
-    prior, how = prior_from_truth(odometry, sorted((t for _, t in truths), key=lambda truth: truth.time_ns))
+    prior, how = prior_from_truth([m for _, m in measurements], [truth for _, truth in truths])
     metadata = {"source": "rosbag", "topics": cast, "prior": how}
     if warnings:
         metadata["warnings"] = "\n".join(warnings)

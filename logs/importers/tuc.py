@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from fusion import Odometry, RangeReading, Ranges, RecordingError, Truth, World
+from fusion import Measurement, Odometry, RangeReading, Ranges, RecordingError, Truth, World
 from fusion.values import seconds
 from logs.importers.foreign_recording import Recording, exact_ns
 from logs.prior import prior_from_truth
@@ -50,7 +50,8 @@ def _recording(path: Path) -> Recording:
         ranges.append(Ranges(time_ns, "uwb", i, (RangeReading(row[6], far),)))
     odometry = _odometry(path, [row for row in rows if row[1][0] == "odom2diff"])
     truths = _truths(path.with_name(path.name.replace("_Input", "_GT")))
-    prior, how = prior_from_truth(odometry, truths, path_m=WHOLE_RUN_M, heading_std=0.1)
+    measurements: list[Measurement] = [*odometry, *ranges]
+    prior, how = prior_from_truth(measurements, truths, path_m=WHOLE_RUN_M, heading_std=0.1)
     table = {
         "name": path.stem.removesuffix("_Input"),
         "provenance": "range offset 0.118 m and noise were measured on the Labyrinth run itself (in-sample there)",
@@ -59,7 +60,7 @@ def _recording(path: Path) -> Recording:
         "robot": {"drive": "differential", "track_width_m": TRACK_WIDTH_M, "noise": NOISE},
     }
     about = {"source": "tuc", "licence": "CC BY-SA 4.0, Tim Pfeifer (TU Chemnitz)", "prior": how}
-    return Recording(str(table["name"]), World.from_table(table), prior, [*odometry, *ranges], truths, about)
+    return Recording(str(table["name"]), World.from_table(table), prior, measurements, truths, about)
 
 
 def _rows(path: Path) -> Iterator[Fields]:

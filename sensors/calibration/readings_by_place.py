@@ -18,6 +18,7 @@ from fusion.arrays import Flags, Floats, Whole
 from fusion.radio import DistanceModel
 from fusion.world import Anchor
 from logs.importers.foreign_recording import read_table
+from logs.prior import begin_ns
 from logs.run import Run
 from logs.truth import Instants, interpolate_truth, known_truth
 from sensors.calibration.segments import GAP_S
@@ -124,8 +125,8 @@ def _truth(run: Run) -> _Where:
 
 
 def _surveyed(path: Path, run: Run) -> _Where:
-    """A CSV file with the columns from_s, until_s [s since the run's first measurement], x_m and y_m."""
-    start = min(measurement.time_ns for measurement in run.measurements)
+    """A CSV file with the columns from_s, until_s [s since the run's start], x_m and y_m."""
+    start = begin_ns(run.measurements)
     spans, x, y = list[tuple[int, int]](), list[float](), list[float]()
     for row in read_table(path, ("from_s", "until_s", "x_m", "y_m")):
         spans.append((start + row.time_ns("from_s"), start + row.time_ns("until_s")))

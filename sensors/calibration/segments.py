@@ -17,6 +17,7 @@ from fusion import LogError
 from fusion.arrays import Floats, Whole
 from fusion.values import nanoseconds
 from logs.importers.foreign_recording import read_table
+from logs.prior import begin_ns
 from logs.run import Run
 from logs.truth import Instants, evaluation_instants
 from sensors.calibration.wheels import Wheels
@@ -179,10 +180,10 @@ def _by_course(truth: Instants, number: int, pieces: list[Piece], wheels: Wheels
 
 
 def read_segments(path: Path, run: Run, number: int) -> list[Segment]:
-    """Segments measured by hand: a CSV file with the columns from_s, until_s [s since the run's first measurement],
+    """Segments measured by hand: a CSV file with the columns from_s, until_s [s since the run's start],
     distance_m (end from beginning) and turn_rad (whole turns counted, left positive), either of them may be empty.
     """
-    start = min(measurement.time_ns for measurement in run.measurements)
+    start = begin_ns(run.measurements)
     found = []
     for row in read_table(path, ("from_s", "until_s", "distance_m", "turn_rad")):
         begin, end = start + row.time_ns("from_s"), start + row.time_ns("until_s")
