@@ -11,7 +11,7 @@ demo: $(READY)
 	$(BIN)/fusion demo --output fusion-demo
 
 test: $(READY)
-	$(BIN)/python -m pytest -q -n auto
+	$(BIN)/python -m pytest -q -n auto $(TESTS)
 
 # Scores agree with evo's to 1e-9. It is GPL: a program of its own in an environment of its own, never imported.
 test-evo: $(READY) $(EVO)/bin/evo_ape

@@ -14,7 +14,6 @@ from benchmarks.metrics.errors import Errors, errors
 from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.matching import Answers, match
 from benchmarks.metrics.metric import Unit
-from benchmarks.review.frame import Frame
 from benchmarks.runner.execute import stored_track
 from benchmarks.runner.results import Result, by_estimator, comparison, judged, median_metrics
 from benchmarks.runner.run_source import open_run
@@ -26,6 +25,7 @@ from benchmarks.statistics.verdict import Comparison
 from fusion import ParameterError, Ranges
 from fusion.arrays import Floats
 from fusion.values import NANOSECONDS
+from logs.prior import begin_ns
 from logs.run import Run
 from logs.truth import Instants, evaluation_instants
 
@@ -171,7 +171,7 @@ class ReportData:
 
     def _start_ns(self, run_id: str) -> int:
         if run_id not in self._starts_ns:
-            self._starts_ns[run_id] = Frame.around(self.run(run_id)).start_ns
+            self._starts_ns[run_id] = begin_ns(self.run(run_id).measurements)
         return self._starts_ns[run_id]
 
     def _series(self, result: Result) -> Series:

@@ -12,11 +12,10 @@ from zipfile import BadZipFile
 from benchmarks.faults.inject import apply_faults
 from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.fates import FateColumns
-from benchmarks.review.frame import Frame
 from benchmarks.runner.archive import from_bytes, to_bytes
 from benchmarks.runner.estimator_run import EstimatorRun, run_estimator
 from benchmarks.runner.plan import Cell, has_estimate, read_faults
-from benchmarks.runner.reference import reference_of
+from benchmarks.runner.reference import Reference, reference_of
 from benchmarks.runner.run_source import open_run
 from benchmarks.runner.scoring import End, Score, score
 from benchmarks.runner.store import Store, to_json
@@ -105,14 +104,13 @@ def faulty_run(cell: Cell) -> Run:
 
 def keep(cell: Cell, store: Store, made: EstimatorRun, run: Run | None, ended: str = "crashed") -> None:
     """Put the estimate of a cell into the store; ``run`` None: it was lost with its process."""
-    about = {"measurements": 0, "warnings": [], "world": None, "world_hash": None, "start_ns": None}
+    about = {"measurements": 0, "warnings": [], "world": None, "world_hash": None}
     if run is not None:
         about = {
             "measurements": len(run.measurements),
             "warnings": list(run.warnings),
             "world": run.world.name,
             "world_hash": run.world.hash,
-            "start_ns": Frame.around(run).start_ns,
         }
     ending = {"ended": ended if made.error else "ok", "error": made.error, **_broken_limit(cell, ended)}
     result = {"cell": str(cell), **ending, "digest": made.digest, "fates": made.fates.counts, **about}
@@ -140,19 +138,19 @@ def keep_score(cell: Cell, store: Store) -> str:
     if store.has("scores", cell.score_key):
         return str(store.read_json("scores", cell.score_key, "result.json")["status"])
     made = store.read_json("estimates", cell.estimate_key, "result.json")
-    scored = _score(cell, store, made)
-    start_ns, worst_ns = made["start_ns"], scored.worst_at_ns
-    worst_at_s = None if worst_ns is None or start_ns is None else seconds(worst_ns - start_ns)
+    reference = reference_of(cell, store)
+    scored = _score(cell, store, reference, made)
+    worst_at_s = None if scored.worst_at_ns is None else seconds(scored.worst_at_ns - reference.begin_ns)
     numbers = {key: _finite(value) for key, value in scored.metrics.items()}
     result = {**scored.end._asdict(), "metrics": numbers, "worst_at_s": worst_at_s}
     store.write("scores", cell.score_key, {"result.json": to_json(result)})
     return scored.status
 
 
-def _score(cell: Cell, store: Store, made: dict[str, Any]) -> Score:
+def _score(cell: Cell, store: Store, reference: Reference, made: dict[str, Any]) -> Score:
     return score(
         *stored_track(cell, store),
-        reference_of(cell, store),
+        reference,
         crash=End(str(made["ended"]), made["error"]) if made["error"] else None,
         rules=cell.evaluation,
         faults=read_faults(cell.fault),
