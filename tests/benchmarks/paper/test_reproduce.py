@@ -18,7 +18,7 @@ from benchmarks.paper.interpretations import ORIGINS_M, READINGS, literal
 from benchmarks.paper.page import markdown
 from benchmarks.paper.published import EKF, ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.reproduce import reproduce
-from benchmarks.paper.trial import GYRO, GYRO_LANES, run_alternative, run_trial
+from benchmarks.paper.trial import GYRO, GYRO_ESTIMATORS, run_alternative, run_trial
 from benchmarks.paper.variants import with_gyro
 from benchmarks.runner.estimator_run import run_estimator
 from fusion import ParameterError, WorldError
@@ -28,19 +28,19 @@ from logs.truth import evaluation_instants
 from sensors.simulation.scenario import load_scenario
 from sensors.simulation.simulate import simulated_run
 
-PAPER = {ODOMETRY, WIFI, PROPOSED, EKF, *(name + GYRO for name in GYRO_LANES)}
-"""Lanes that are run whatever is asked for."""
+PAPER = {ODOMETRY, WIFI, PROPOSED, EKF, *(name + GYRO for name in GYRO_ESTIMATORS)}
+"""Estimators that are run whatever is asked for."""
 SEEN = []
 
 
 @pytest.fixture(scope="module")
 def report():
-    """Two runs by two processes, what was told of the progress left in ``SEEN``."""
+    """Two runs by two processes, the progress they report left in ``SEEN``."""
     return reproduce(2, seed=5, workers=2, progress=lambda done, total, what: SEEN.append((done, total)))
 
 
 def test_progress_counts_every_run(report):
-    assert SEEN == [(done, len(SEEN)) for done in range(1, len(SEEN) + 1)]
+    assert [(done, len(SEEN)) for done in range(1, len(SEEN) + 1)] == SEEN
 
 
 def test_a_seed_gives_its_run_whichever_is_the_first_and_whatever_the_workers(report):
@@ -60,12 +60,12 @@ def test_a_seed_gives_its_run_whichever_is_the_first_and_whatever_the_workers(re
 
 def test_every_estimator_runs_on_the_same_runs_and_some_on_a_gyro(report):
     for outcome in report.outcomes:
-        assert set(outcome.errors) == {*fusion.built_in_names(), *(name + GYRO for name in GYRO_LANES)}
+        assert set(outcome.errors) == {*fusion.built_in_names(), *(name + GYRO for name in GYRO_ESTIMATORS)}
         assert {e.shape for e in outcome.errors.values()} == {(2, outcome.environment.trial_points, 2)}
         assert not outcome.crashes
 
 
-def test_literal_reading_and_unmoved_origin_are_the_proposed_lane_itself(report):
+def test_literal_reading_and_unmoved_origin_are_the_proposed_method_itself(report):
     for outcome in report.outcomes:
         own = outcome.largest(PROPOSED)
         assert outcome.readings[:, READINGS.index(literal())] == pytest.approx(own, abs=1e-6)
@@ -119,7 +119,7 @@ def test_unknown_estimator_is_refused_before_any_work(capsys):
     assert "did you mean 'particle'" in capsys.readouterr().err
 
 
-def test_estimator_that_crashes_costs_its_own_lane_and_is_told():
+def test_estimator_that_crashes_costs_its_own_result_and_is_reported():
     with fusion.registered("broken", Broken):
         trial = run_trial(("paper_office", 0), estimators=["broken"])
     assert "ZeroDivisionError" in trial.crashes["broken"]
