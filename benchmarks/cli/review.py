@@ -10,14 +10,18 @@ from pathlib import Path
 
 from benchmarks.review.listing import told
 from benchmarks.review.review import PREFIX, SCENE, review
-from benchmarks.review.reviewed_run import remarks, subject
+from benchmarks.review.reviewed_run import own_log, remarks
 from benchmarks.review.scene import SUFFIX
 from benchmarks.review.window import serve_web
+from benchmarks.runner.run_source import open_run
+from benchmarks.runner.suite import load_suite
 from fusion import ParameterError
 from fusion.cli.arguments import at_least_one, not_negative, since_start
 from fusion.cli.options import parse_settings
 from fusion.plugins import left_out
-from logs.cli.import_ import bag_options
+from logs.cli.import_ import bag_options, given_options
+from logs.importers.rosbag import need_world, read_bag
+from logs.run import Run
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -112,3 +116,19 @@ def words(arguments: argparse.Namespace) -> Iterator[str]:
         yield from ("--topic", topic)
     if arguments.truth_to_map is not None:
         yield from ("--truth-to-map", *(f"{number:g}" for number in arguments.truth_to_map))
+
+
+def subject(arguments: argparse.Namespace) -> Run:
+    """The run that is asked for: a log of ours, a bag with a world, or a run of a suite.
+
+    Raises `ParameterError`, `LogError`, `SuiteError` or `WorldError`.
+    """
+    options = given_options(arguments)
+    if arguments.suite is not None:
+        if options:
+            raise ParameterError("--suite says already how its bags are read; leave --world, --topic and the like out")
+        suite = load_suite(arguments.suite)
+        return open_run(suite.run(str(arguments.run)), suite.folder)
+    if options:
+        return read_bag(arguments.run, need_world(options.pop("world", None)), **options)
+    return own_log(arguments.run)

@@ -373,7 +373,7 @@ def test_estimator_without_answers_and_crashed_one_have_a_legend_and_no_track(tm
 def test_score_table_ranks_the_live_first_and_tells_the_crash(tmp_path):
     run = run_of(tmp_path)
     lines = markdown(drawings(run, scored(run, ["broken", "toy"]))).splitlines()
-    assert lines[2].endswith("| age | gaps |")
+    assert lines[2].endswith("| age s | gaps |")
     assert lines[4].startswith("| toy | 50.0 |")
     assert lines[4].endswith(" | 0 |")
     assert lines[5].startswith("| broken (crashed) |")
