@@ -8,7 +8,7 @@ import pytest
 
 import fusion
 from benchmarks.review.frame import Frame
-from benchmarks.runner.estimator_run import run_lane
+from benchmarks.runner.estimator_run import run_estimator
 from estimators.dead_reckoning import DeadReckoning
 from fusion import Covariance, Odometry, Pose, Prior, RssiReading, Truth, WifiScan, World
 from fusion.belief import UNKNOWN_HEADING_STD
@@ -93,7 +93,7 @@ def test_info_judges_the_very_prior_that_bench_gives(tmp_path, given):
     Recorded.priors.clear()
     with fusion.registered("recorded", Recorded):
         usability(run)
-        run_lane(run, "recorded")
+        run_estimator(run, "recorded")
     judged, benched = Recorded.priors
     assert judged == benched == starting_prior(run)
 

@@ -104,14 +104,14 @@ def test_what_cannot_be_solved_is_refused_with_a_remedy(monkeypatch):
 def test_nothing_is_solved_for_twice_and_never_on_the_proposed_method():
     asked = unknowns()
     assert len(set(asked)) == len(asked)
-    assert {unknown.estimator_run for unknown in asked} == {ODOMETRY, WIFI}
+    assert {unknown.estimator for unknown in asked} == {ODOMETRY, WIFI}
     assert not any(unknown.target_m == unknown.environment.maxima_m[PROPOSED] for unknown in asked)
 
 
 def test_files_keep_their_comments_and_lead_back_to_the_same_scenarios(tmp_path, monkeypatch):
     numbers = {ODOMETRY: Solved(0.5, 0.24), WIFI: Solved(1.5, 0.82)}
     monkeypatch.setattr(
-        environment_files, "solve_all", lambda *_: ((unknown, numbers[unknown.estimator_run]) for unknown in unknowns())
+        environment_files, "solve_all", lambda *_: ((unknown, numbers[unknown.estimator]) for unknown in unknowns())
     )
     told = []
     written = write_calibrated(tmp_path, told=told.append)

@@ -20,8 +20,8 @@ def outcome(odometry, wifi, proposed, environment=OFFICE, **more):
     """Errors along x alone, (runs, points) [m] each."""
     curves = {ODOMETRY: odometry, WIFI: wifi, PROPOSED: proposed}
     errors = {
-        estimator_run: np.stack([np.array(rows, float), np.zeros_like(rows, float)], axis=2)
-        for estimator_run, rows in curves.items()
+        estimator: np.stack([np.array(rows, float), np.zeros_like(rows, float)], axis=2)
+        for estimator, rows in curves.items()
     }
     n, p, _ = errors[PROPOSED].shape
     parts = {

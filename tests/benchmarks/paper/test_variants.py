@@ -23,8 +23,8 @@ def plain(scenario="paper_office", seed=3):
     return without_gyro(simulated_run(load_scenario(scenario), seed))
 
 
-def errors(run, estimator_run, **options):
-    return track_errors(run, run_estimator(run, estimator_run, options))
+def errors(run, estimator, **options):
+    return track_errors(run, run_estimator(run, estimator, options))
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -39,12 +39,12 @@ def test_robot_drives_to_as_many_trial_points_as_the_paper_and_scans_at_each(sce
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-@pytest.mark.parametrize("estimator_run", [ODOMETRY, WIFI, PROPOSED])
-def test_leg_by_leg_is_the_same_run_and_far_shorter(scenario, estimator_run):
+@pytest.mark.parametrize("estimator", [ODOMETRY, WIFI, PROPOSED])
+def test_leg_by_leg_is_the_same_run_and_far_shorter(scenario, estimator):
     run = plain(scenario)
     brief = leg_by_leg(run)
     assert len(brief.measurements) == 4 * len(run.truth)
-    assert errors(brief, estimator_run) == pytest.approx(errors(run, estimator_run), abs=1e-6)
+    assert errors(brief, estimator) == pytest.approx(errors(run, estimator), abs=1e-6)
 
 
 def test_leg_by_leg_knows_the_distance_travelled_to_the_drift_of_the_legs():
