@@ -11,6 +11,7 @@ import pytest
 import fusion
 from benchmarks.cli import demo as module
 from benchmarks.cli.demo import demo, next_commands, program
+from benchmarks.review.reviewed_run import own_log
 from benchmarks.runner.suite import load_suite
 from fusion import ViewerError
 from logs.reader import read_run
@@ -37,30 +38,42 @@ def test_suite_that_the_demo_reports_on_is_installed():
     assert load_suite(module.SUITE).name == "quick"
 
 
-def test_demo_leaves_log_scores_review_picture_and_report_where_rerun_cannot_draw(tmp_path, monkeypatch, capsys):
-    pytest.importorskip("rerun", reason="needs the extra `review`")
-    monkeypatch.setattr(module, "render", no_driver)
-    made = demo(tmp_path / "demo", duration_s=6.0, suite=small(tmp_path), workers=1)
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """One demo for all, in the folder `my demo` of the current one."""
+    here = tmp_path_factory.mktemp("here")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(here)
+        yield demo(Path("my demo"), duration_s=6.0, suite=small(here), workers=1)
+
+
+def test_demo_leaves_log_scores_and_report(made):
     assert read_run(made.log).truth is not None
     records = json.loads(made.records.read_text())
     assert {record["estimator"] for record in records} == set(fusion.available())
-    assert made.drawn.scene.stat().st_size > 0
-    assert made.drawn.picture.read_bytes().startswith(b"\x89PNG")
-    assert not made.drawn.rendered
-    assert f"{made.drawn.picture} is by matplotlib, not by Rerun: no driver here\n" in capsys.readouterr().err
     assert "1 run, 2 estimators, no faults, 1 seed: 2 cells." in made.page.read_text(encoding="utf-8")
 
 
-def test_command_prints_the_table_the_files_and_three_commands_that_run_as_printed(tmp_path, monkeypatch, capsys):
+def test_review_and_picture_are_there_where_rerun_cannot_draw(made, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("rerun", reason="needs the extra `review`")
+    monkeypatch.setattr(module, "render", no_driver)
+    drawn = module._draw(own_log(made.log), tmp_path, 0)
+    assert drawn.scene.stat().st_size > 0
+    assert drawn.picture.read_bytes().startswith(b"\x89PNG")
+    assert not drawn.rendered
+    assert f"{drawn.picture} is by matplotlib, not by Rerun: no driver here\n" in capsys.readouterr().err
+
+
+def test_command_prints_the_table_the_files_and_three_commands_that_run_as_printed(made, monkeypatch, capsys):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", os.defpath)
-    short = {"duration_s": 6.0, "suite": small(tmp_path), "workers": 1}
-    monkeypatch.setattr(module, "demo", lambda folder, *, seed: demo(folder, seed=seed, **short))
+    asked = []
+    monkeypatch.setattr(module, "demo", lambda *folder, **more: asked.append((folder, more)) or made)
     from fusion.cli.main import main
 
-    assert main(["demo", "-o", "my demo"]) == 0
+    assert main(["demo", "-o", "my demo", "--seed", "3"]) == 0
+    assert asked == [((Path("my demo"),), {"seed": 3})]
     printed = capsys.readouterr().out
     assert "position error of" in printed
     for name in ("run.mcap", "review.png", "report.html"):
@@ -91,11 +104,11 @@ def test_review_that_is_proposed_is_one_that_this_machine_can_make(window, rende
     assert first == f"{program()} {words}"
 
 
-def test_without_rerun_and_without_matplotlib_one_line_names_both_remedies(tmp_path, monkeypatch, capsys):
+def test_without_rerun_and_without_matplotlib_one_line_names_both_remedies(made, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "rerun", None)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    made = demo(tmp_path / "demo", duration_s=6.0, suite=small(tmp_path), workers=1)
-    assert made.drawn == module.Drawn(None, None, rendered=False)
+    assert module._draw(own_log(made.log), tmp_path, 0) == module.Drawn(None, None, rendered=False)
+    assert module._report(made.suite, made.log.parent, 1) is None
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "no picture" in line]
     assert "fusion-localization[review]" in line
     assert "fusion-localization[plots]" in line

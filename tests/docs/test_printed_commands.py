@@ -84,7 +84,7 @@ def named(table, line):
 def at_hand(tmp_path, monkeypatch):
     """Files that the README takes for granted: a folder of CSV, a log that was cut off, a robot file."""
     monkeypatch.chdir(tmp_path)
-    assert main(["simulate", "office", "--duration", "20", "-o", "mine.mcap"]) == 0
+    assert main(["simulate", "office", "--duration", "10", "-o", "mine.mcap"]) == 0
     assert main(["export", "mine.mcap", "--csv", "-o", "my_recording"]) == 0
     whole = Path("mine.mcap").read_bytes()
     Path("cut_off.mcap").write_bytes(whole[: len(whole) // 2])
