@@ -77,16 +77,19 @@ def more_is_better(metric: str) -> bool:
 
 def require_lower_is_better(metric: str) -> None:
     """Raises `ParameterError` for a metric of which more is better, or a certain value: that the lower wins would be
-    the wrong verdict.
+    the wrong verdict; and for one that may be below zero, for verdicts are on ratios.
     """
-    if metric in METRICS and METRICS[metric].better is not Better.LESS:
+    known = METRICS.get(metric)
+    if known is not None and known.better is not Better.LESS:
         raise ParameterError(f"a lower {metric} is not better, so it decides nothing here; {RANKED_BY} is usual")
+    if known is not None and known.signed:
+        raise ParameterError(f"{metric} may be below zero, so it has no ratio to decide by; {RANKED_BY} is usual")
 
 
 def as_table() -> str:
     """The catalogue as a Markdown table: metrics that differ by their ids alone share a row."""
     lines = ["| Metric | Unit | Better | What it is | Needs |", "|---|---|---|---|---|"]
-    for (unit, better, title, needs), group in groupby(METRICS.values(), key=lambda one: one[1:]):
+    for (unit, better, title, needs), group in groupby(METRICS.values(), key=lambda one: one[1:5]):
         ids = ", ".join(f"`{one.id}`" for one in group)
         lines.append(f"| {ids} | {unit} | {better.value} | {title} | {needs} |")
     return "\n".join(lines) + "\n"

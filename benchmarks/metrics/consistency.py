@@ -18,9 +18,7 @@ CLAIM = "covariance"
 METRICS = (
     *rows("anees anees_2d", "1", Better.NEITHER, "ANEES of pose and position: 1 is honest, more is too certain", CLAIM),
     *rows("cover95 cover95_2d", "share", Better.NEITHER, "share of errors inside the claimed 95 % region", CLAIM),
-    *rows(
-        "nll_3d nll_2d", "nat", Better.LESS, "negative log-likelihood of pose and position: accuracy and honesty", CLAIM
-    ),
+    *rows("nll_3d nll_2d", "nat", Better.LESS, "negative log-likelihood of pose and position", CLAIM, signed=True),
     *rows("energy", "m", Better.LESS, "energy score of the position: accuracy and honesty", CLAIM),
 )
 """Of the functions below."""

@@ -33,19 +33,15 @@ METRICS = (
     *rows("failures", "count", Better.LESS, "times that the error exceeds 3 m, or is missing, for 2 s"),
     *rows("t_recover", "s", Better.LESS, "of the worst of these, time until converged again"),
     *rows("max_in_outage", "m", Better.LESS, "of the worst of these, greatest error"),
-    *rows("growth", "m/s", Better.LESS, "of the worst of these, slope of the error"),
+    *rows("growth", "m/s", Better.LESS, "of the worst of these, slope of the error", signed=True),
     *rows("age_p95", "s", Better.LESS, "age of the newest estimate, 95 % quantile"),
     *rows("dropouts", "count", Better.LESS, "stretches without a valid estimate"),
     *rows("dropout_s", "s", Better.LESS, "time that all of these last"),
-    *rows(
-        "coverage", "share", Better.MORE, "share of the visited square metres where 95 % of instants have an estimate"
-    ),
+    *rows("coverage", "share", Better.MORE, "share of visited square metres with estimates at 95 % of the instants"),
     *rows("fault_availability", "share", Better.MORE, "share of the instants of a fault with an estimate", FAULT),
-    *rows(
-        "fault_t_recover", "s", Better.LESS, "from the end of a fault until the error stays below 1 m for 5 s", FAULT
-    ),
+    *rows("fault_t_recover", "s", Better.LESS, "from the end of a fault until the error stays below 1 m", FAULT),
     *rows("fault_max_in_outage", "m", Better.LESS, "greatest error during a fault", FAULT),
-    *rows("fault_growth", "m/s", Better.LESS, "slope of the error during a fault", FAULT),
+    *rows("fault_growth", "m/s", Better.LESS, "slope of the error during a fault", FAULT, signed=True),
 )
 """Of the functions below; those of faults are the worst over their windows."""
 

@@ -14,9 +14,8 @@ from fusion.quantiles import quantile
 MOST_PAIRS = 3000
 """Slopes that a median is taken of. Of more pairs than these every k-th is used: the median then strays a tenth more
 than that of all would."""
-METRICS = rows(
-    "eag", "m/s", Better.LESS, "slope of the error over the time since the last radio fix used", "used fixes"
-)
+EAG = "slope of the error over the time since the last radio fix used"
+METRICS = rows("eag", "m/s", Better.LESS, EAG, "used fixes", signed=True)
 """Of the function below."""
 
 

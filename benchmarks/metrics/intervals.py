@@ -28,9 +28,7 @@ UNKNOWN_BANDS = dict.fromkeys(
 )
 
 METRICS = (
-    *rows(
-        "n_eff", "count", Better.MORE, "independent instants that the instants are worth, by the error's correlation"
-    ),
+    *rows("n_eff", "count", Better.MORE, "independent instants that all are worth, by the error's correlation"),
     *rows(
         " ".join(f"{name}_{end}" for name in POSITION_QUANTILES for end in ("low", "high")),
         "m",

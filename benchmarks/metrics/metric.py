@@ -52,7 +52,8 @@ UNITS = {
 
 class Metric(NamedTuple):
     """Meaning of one number of a score. ``id``: its key in every record; ``si_unit``: one of `UNITS`; ``title``: its
-    meaning, for the documentation; ``needs``: what a run or an estimator must have, or it is NaN or missing.
+    meaning, for the documentation; ``needs``: what a run or an estimator must have, or it is NaN or missing;
+    ``signed``: it may be below zero, so that two of them have no ratio.
     """
 
     id: str
@@ -60,6 +61,7 @@ class Metric(NamedTuple):
     better: Better
     title: str
     needs: str = "truth"
+    signed: bool = False
 
     @property
     def unit(self) -> Unit:
@@ -67,6 +69,8 @@ class Metric(NamedTuple):
         return UNITS[self.si_unit]
 
 
-def rows(ids: str, si_unit: str, better: Better, title: str, needs: str = "truth") -> tuple[Metric, ...]:
+def rows(
+    ids: str, si_unit: str, better: Better, title: str, needs: str = "truth", *, signed: bool = False
+) -> tuple[Metric, ...]:
     """Rows of several ``ids``, separated by spaces, that have all else in common."""
-    return tuple(Metric(one, si_unit, better, title, needs) for one in ids.split())
+    return tuple(Metric(one, si_unit, better, title, needs, signed) for one in ids.split())

@@ -62,7 +62,9 @@ def test_units_and_directions_come_from_the_rows():
     assert more_is_better("availability")
     assert not more_is_better("pos_p75")
     require_lower_is_better("pos_p75")
-    require_lower_is_better("nll_2d")
     for metric in ("availability", "anees", "bias_x", "cover95"):
         with pytest.raises(ParameterError, match=f"a lower {metric} is not better"):
+            require_lower_is_better(metric)
+    for metric in ("nll_2d", "growth", "fault_growth", "eag"):
+        with pytest.raises(ParameterError, match=f"{metric} may be below zero"):
             require_lower_is_better(metric)
