@@ -70,12 +70,13 @@ def prior_from_truth(
     if first is None:
         return None, "no truth: start unknown"
     if first.known_heading is not None:
-        return _known(first, first.known_heading, HEADING_STD_RAD), "first true pose, 0.05 m, 0.05 rad"
+        how = f"true pose at the start, {POSITION_STD_M:g} m, {HEADING_STD_RAD:g} rad"
+        return _known(first, first.known_heading, HEADING_STD_RAD), how
     odometry = sorted((m for m in measurements if isinstance(m, Odometry) and m.time_ns > first.time_ns), key=order)
     heading = heading_from_motion(odometry, track, first, path_m)
     if heading is None:
-        return _known(first, None, heading_std), "first true position, heading unknown"
-    how = f"first true position, heading from the first {path_m:g} m of motion against the truth"
+        return _known(first, None, heading_std), "true position at the start, heading unknown"
+    how = f"true position at the start, heading from the first {path_m:g} m of motion against the truth"
     return _known(first, heading, heading_std), how
 
 

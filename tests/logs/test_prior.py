@@ -118,7 +118,7 @@ def test_import_and_bench_take_one_true_pose(tmp_path):
 def test_poses_without_a_position_start_no_run():
     nowhere = [Truth(0, math.nan, math.nan, 0.0), Truth(SECOND, 2.0, 3.0, None)]
     prior, how = prior_from_truth([], nowhere)
-    assert (prior.time_ns, prior.heading_known, how) == (SECOND, False, "first true position, heading unknown")
+    assert (prior.time_ns, prior.heading_known, how) == (SECOND, False, "true position at the start, heading unknown")
     assert prior.covariance.hh == pytest.approx(UNKNOWN_HEADING_STD**2)
     assert prior_from_truth([], nowhere[:1]) == (None, "no truth: start unknown")
 
