@@ -52,7 +52,7 @@ class Report(NamedTuple):
 
     @property
     def remarks(self) -> list[str]:
-        """What the tables cannot say: why a estimator crashed."""
+        """What the tables cannot say: why an estimator crashed."""
         return [
             f"{outcome.environment.title}: {estimator} crashed: {why}"
             for outcome in self.outcomes

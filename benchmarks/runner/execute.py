@@ -104,14 +104,12 @@ def faulty_run(cell: Cell) -> Run:
 
 def keep(cell: Cell, store: Store, made: EstimatorRun, run: Run | None, ended: str = "crashed") -> None:
     """Put the estimate of a cell into the store; ``run`` None: it was lost with its process."""
-    about = {"measurements": 0, "warnings": [], "world": None, "world_hash": None}
-    if run is not None:
-        about = {
-            "measurements": len(run.measurements),
-            "warnings": list(run.warnings),
-            "world": run.world.name,
-            "world_hash": run.world.hash,
-        }
+    about = {
+        "measurements": None if run is None else len(run.measurements),
+        "warnings": [] if run is None else list(run.warnings),
+        "world": None if run is None else run.world.name,
+        "world_hash": None if run is None else run.world.hash,
+    }
     ending = {"ended": ended if made.error else "ok", "error": made.error, **_broken_limit(cell, ended)}
     result = {"cell": str(cell), **ending, "digest": made.digest, "fates": made.fates.counts, **about}
     files = {"result.json": to_json(result), "track.npz": to_bytes(made.track, made.fates)}

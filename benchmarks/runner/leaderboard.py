@@ -15,12 +15,10 @@ from benchmarks.statistics.verdict import Comparison, Verdict
 from fusion.output.tables import Sheet
 
 WORST = "pos_rmse_worst"
-"""The greatest RMSE of any cell."""
-COST_COLUMN, WORST_COLUMN = (
-    column(COST.id, "time"),
-    column("pos_rmse", "worst\nRMSE", separator=" ")._replace(key=WORST),
-)
-AVAILABILITY_COLUMN = COLUMNS[-1]
+"""The greatest RMSE of any cell, infinite where one was lost."""
+WORST_COLUMN = column("pos_rmse", "worst\nRMSE", separator=" ")._replace(key=WORST)
+COST_COLUMN = column(COST.id, "time")
+AVAILABILITY_COLUMN = column("availability", "avail.")
 
 
 class Entry(NamedTuple):
@@ -51,15 +49,12 @@ def entries(results: Sequence[Result], fault: str = CLEAN) -> list[Entry]:
 def _entry(name: str, own: Sequence[Result]) -> Entry:
     metrics = median_metrics(own)
     if len(own) > 1:
-        metrics[WORST] = max((one.metrics.get("pos_rmse", math.nan) for one in own), key=_known)
+        rmse = (one.metrics.get("pos_rmse", math.nan) for one in own)
+        metrics[WORST] = max(math.inf if math.isnan(value) else value for value in rmse)
     costs = [one.cost_s for one in own if one.cost_s is not None]
     if costs:
         metrics[COST.id] = sum(costs) / len(costs)
     return Entry(name, tuple(one.status for one in own), metrics)
-
-
-def _known(value: float) -> float:
-    return -math.inf if math.isnan(value) else value
 
 
 def leaderboard(title: str, rows: Sequence[Entry], columns: Sequence[Column] | None = None) -> Sheet:

@@ -32,28 +32,30 @@ def run_suite(
     """
     cells = cells_of(suite, store)
     wanted = cells if part is None else shard(cells, *part)
-    refuse_impossible(missing(wanted, store).estimates)
+    open_cells = missing(wanted, store)
+    refuse_impossible(open_cells.estimates)
     limits = Limits(suite.limits.wall_s, suite.limits.rss_mb)
-    for _ in carry_out_cells(wanted, store, limits, workers=workers, dask=dask, progress=progress):
-        pass
+    todo = [*open_cells.estimates, *open_cells.scores]
+    carry_out_cells(todo, store, limits, workers=workers, dask=dask, progress=progress)
     return read_results(cells, store)
 
 
 def carry_out_cells(
-    cells: Sequence[Cell],
+    todo: Sequence[Cell],
     store: Store,
     limits: Limits | None,
     *,
     workers: int | None = None,
     dask: str | None = None,
     progress: Progress | None = None,
-) -> Iterator[Done]:
-    """Compute what is missing of ``cells``, each answered as it is done."""
-    todo = [one for part in missing(cells, store) for one in part]
+) -> list[Done]:
+    """Carry out ``todo``; answers the cells in the order in which they were done. ``limits`` None: without an end."""
+    finished = []
     for count, done in enumerate(_carried_out(todo, store, limits, workers, dask), start=1):
         if progress is not None:
             progress(count, len(todo), f"{done.cell.run.id} {done.cell.estimator.id}")
-        yield done
+        finished.append(done)
+    return finished
 
 
 def _carried_out(

@@ -26,6 +26,7 @@ STATUSES = ("ok", "unscored", "diverged", "crashed", "timeout", "oom")
 """Ends of a cell, best first; ``unscored``: the log holds no ground truth."""
 ALIVE = ("ok", "unscored")
 """Statuses of a cell that was not lost."""
+USUAL = Evaluation()
 
 
 class End(NamedTuple):
@@ -67,21 +68,21 @@ def score(
     reference: Reference,
     *,
     crash: End | None = None,
-    rules: Evaluation | None = None,
+    rules: Evaluation = USUAL,
     faults: Sequence[Fault] = (),
 ) -> Score:
     """The score of ``track``, by the ``rules`` of a suite, with how it did while its ``faults`` lasted.
 
     ``crash``: how an estimator ended that did not survive. Half a run is no result: its ``track`` is empty.
     """
-    judged = _judge(track, reference, rules or Evaluation(), faults)
-    available = availability(track) if judged is None else judged.metrics["availability"]
-    end = crash or end_of(track, math.nan if judged is None else available)
-    measured = {"availability": available} if judged is None else judged.metrics
-    if judged is not None and end.status not in ALIVE:
-        measured = _left(judged, reference, rules or Evaluation(), faults)
     own = {} if crash or track.flaw else {**innovation_metrics(fates), **nis_metrics(fates)}
-    return Score(end, None if judged is None else judged.errors, {**measured, **own})
+    if len(reference.instants) == 0:
+        return Score(crash or end_of(track, math.nan), None, {"availability": availability(track), **own})
+    measured, found = _judge(track, reference, rules, faults)
+    end = crash or end_of(track, found["availability"])
+    if end.status not in ALIVE:
+        found = _left(found, reference, rules, faults)
+    return Score(end, measured, {**found, **own})
 
 
 def end_of(track: Track, available: float) -> End:
@@ -95,31 +96,28 @@ def end_of(track: Track, available: float) -> End:
     return End("ok")
 
 
-class _Judged(NamedTuple):
-    errors: Errors
-    metrics: dict[str, float]
-
-
-def _judge(track: Track, reference: Reference, rules: Evaluation, faults: Sequence[Fault]) -> _Judged | None:
-    """None without truth."""
-    if len(reference.instants) == 0:
-        return None
+def _judge(
+    track: Track, reference: Reference, rules: Evaluation, faults: Sequence[Fault]
+) -> tuple[Errors, dict[str, float]]:
+    """Errors, and all metrics of them."""
     if rules.reading == "interp":
         met = meet(reference.truth, track, gap_s=rules.gap_s)
         measured = errors(met.instants, met.answers, met.weight)
         # Only there do the errors not show by themselves how much of the run had an answer.
-        return _Judged(measured, {**_metrics(measured, reference, faults), "availability": met.availability})
+        return measured, {**_metrics(measured, reference, faults), "availability": met.availability}
     measured = errors(reference.instants, match(reference.instants, track, max_age_s=rules.max_age_s))
-    return _Judged(measured, _metrics(measured, reference, faults))
+    return measured, _metrics(measured, reference, faults)
 
 
-def _left(judged: _Judged, reference: Reference, rules: Evaluation, faults: Sequence[Fault]) -> dict[str, float]:
+def _left(
+    found: dict[str, float], reference: Reference, rules: Evaluation, faults: Sequence[Fault]
+) -> dict[str, float]:
     """Metrics that are left of an estimator that was lost: `metrics_of_lost`, and its availability. At the estimate's
     own stamps no metric counts an instant without an answer, so there nothing else is left.
     """
     silent = _metrics(unanswered(reference.instants), reference, faults)
-    left = silent if rules.reading == "interp" else metrics_of_lost(judged.metrics, silent)
-    return {**left, "availability": judged.metrics["availability"]}
+    left = silent if rules.reading == "interp" else metrics_of_lost(found, silent)
+    return {**left, "availability": found["availability"]}
 
 
 def _metrics(measured: Errors, reference: Reference, faults: Sequence[Fault]) -> dict[str, float]:

@@ -52,7 +52,7 @@ class Timing(NamedTuple):
 
 
 class Untimed(NamedTuple):
-    """A estimator that has no time, and why."""
+    """An estimator that has no time, and why."""
 
     estimator: str
     why: str
