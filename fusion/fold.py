@@ -57,6 +57,15 @@ def asked(estimator: Estimator[Any], state: Any, motion: Increment, time_ns: int
         raise _failed(estimator, f"when asked for its estimate at {time_ns} ns", error) from error
 
 
+def _started(estimator: Estimator[Any], prior: Prior, seed: int) -> Any:  # noqa: ANN401 - a state is opaque
+    try:
+        return estimator.start(prior, seed)
+    except FusionError:
+        raise
+    except Exception as error:
+        raise _failed(estimator, "at its start", error) from error
+
+
 def _failed(estimator: Estimator[Any], when: str, error: Exception) -> PluginError:
     return PluginError(
         f"{type(estimator).__name__} failed {when}: {error!r}; leave it out with --estimators, or report it to its "
@@ -65,12 +74,15 @@ def _failed(estimator: Estimator[Any], when: str, error: Exception) -> PluginErr
 
 
 class Fold:
-    """The states of one estimator over the epochs of one run. Not thread-safe."""
+    """The states of one estimator over the epochs of one run. Not thread-safe.
+
+    Raises `PluginError` where the estimator fails at its start.
+    """
 
     def __init__(self, estimator: Estimator[Any], prior: Prior, seed: int = 0) -> None:
         self._estimator = estimator
         self._settled = 0
-        self._states: deque[Any] = deque([estimator.start(prior, seed)])
+        self._states: deque[Any] = deque([_started(estimator, prior, seed)])
         """``_states[i]`` is the state after ``_settled + i`` epochs."""
 
     def take(self, moment: Moment) -> Update:
@@ -97,13 +109,19 @@ class Fold:
         """The belief at the last epoch as weighted points; None of an estimator that does not offer them."""
         if not isinstance(self._estimator, ParticleEstimator):
             return None
-        return self._estimator.particles(self._states[-1])
+        try:
+            return self._estimator.particles(self._states[-1])
+        except FusionError:
+            raise
+        except Exception as error:
+            raise _failed(self._estimator, "when asked for its particles", error) from error
 
     def _stepped(self, state: Any, epoch: Epoch) -> tuple[Any, tuple[Fate, ...]]:  # noqa: ANN401
         try:
-            return self._estimator.step(state, epoch.motion, epoch.scan)
+            after, fates = self._estimator.step(state, epoch.motion, epoch.scan)
         except FusionError:
             raise
         except Exception as error:
             scan = "motion alone" if epoch.scan is None else f"{type(epoch.scan).__name__} of {epoch.scan.sensor!r}"
             raise _failed(self._estimator, f"on {scan} at {epoch.time_ns} ns", error) from error
+        return after, fates

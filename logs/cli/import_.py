@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from fusion.errors import ParameterError, RecordingError, did_you_mean
+from fusion.errors import LogError, ParameterError, RecordingError, did_you_mean
 
 KINDS = {
     "csv": "logs.importers.csv_bundle",
@@ -25,13 +25,22 @@ OPEN = "rosbag"
 """The kind that does not say by itself what is what: its ``recordings`` takes options, and a file will do."""
 
 
-def import_recordings(kind: str, folder: Path, output: Path, **options: Any) -> list[Path]:  # noqa: ANN401 - a kind's
+def import_recordings(
+    kind: str,
+    folder: Path,
+    output: Path,
+    *,
+    force: bool = False,
+    **options: Any,  # noqa: ANN401 - a kind's
+) -> list[Path]:
     """Write every run found in ``folder`` as a log; answers their paths.
 
     ``output`` ending in ``.mcap`` is one log, and the folder must hold one run; else a folder that gets one log a run.
     The kind `rosbag` takes a file as well, and the ``options`` of `logs.importers.rosbag.recordings`. What is
-    lost or doubtful stands on stderr. Raises `RecordingError` for an unknown kind, a folder without such files, or a
-    file that cannot be understood, `ParameterError` for options that the kind does not take.
+    lost or doubtful stands on stderr. A log that exists is written over only with ``force``, and nothing is written
+    where one of several exists. Raises `RecordingError` for an unknown kind, a folder without such files, or a
+    file that cannot be understood, `ParameterError` for options that the kind does not take, `LogError` for a log that
+    exists.
     """
     if kind not in KINDS:
         raise RecordingError(f"there is no importer {kind!r}; {did_you_mean(kind, KINDS)}")
@@ -42,12 +51,14 @@ def import_recordings(kind: str, folder: Path, output: Path, **options: Any) -> 
     found = list(importlib.import_module(KINDS[kind]).recordings(folder, **options))
     for warning in (warning for recording in found for warning in recording.doubts):
         sys.stderr.write(f"warning: {warning}\n")
-    if output.suffix != ".mcap":
-        return [recording.write(output / f"{recording.name}.mcap") for recording in found]
-    if len(found) != 1:
+    if output.suffix == ".mcap" and len(found) != 1:
         names = ", ".join(recording.name for recording in found)
         raise RecordingError(f"{folder} holds {len(found)} runs ({names}); give a folder with -o, not one file")
-    return [found[0].write(output)]
+    paths = [output if output.suffix == ".mcap" else output / f"{recording.name}.mcap" for recording in found]
+    for path in paths:
+        if path.exists() and not (force and path.is_file()):
+            raise LogError(f"{path}: exists already; choose another name, or write over a file with --force")
+    return [recording.write(path) for recording, path in zip(found, paths, strict=True)]
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -62,6 +73,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="a log (*.mcap), or a folder for one log per run",
     )
+    parser.add_argument("--force", action="store_true", help="write over logs that exist")
     bag_options(parser.add_argument_group("rosbag only"))
 
 
@@ -86,7 +98,8 @@ def bag_options(bag: argparse._ArgumentGroup) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Import and list what was written."""
-    written = import_recordings(arguments.kind, arguments.folder, arguments.output, **given_options(arguments))
+    options = given_options(arguments)
+    written = import_recordings(arguments.kind, arguments.folder, arguments.output, force=arguments.force, **options)
     for path in written:
         sys.stdout.write(f"{path}\n")
     return 0

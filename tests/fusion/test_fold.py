@@ -178,6 +178,35 @@ class FailsToEstimate(Ledger):
         return super().estimate(state, motion, time_ns)
 
 
+class FailsToStart(Ledger):
+    def start(self, prior, seed):
+        raise KeyError("no such place")
+
+
+class FailsToShow(Ledger):
+    def particles(self, state):
+        raise IndexError("no such point")
+
+
+def test_estimator_that_fails_to_start_is_named():
+    with pytest.raises(PluginError, match=r"FailsToStart failed at its start: .*no such place.*--estimators"):
+        Tracker(FailsToStart(), WORLD, PRIOR)
+
+
+def test_estimator_that_fails_to_show_its_particles_is_named():
+    with pytest.raises(PluginError, match=r"FailsToShow failed when asked for its particles: .*no such point"):
+        Tracker(FailsToShow(), WORLD, PRIOR).particles()
+
+
+def test_step_that_answers_no_pair_is_a_failure_of_the_estimator():
+    class Forgets(Ledger):
+        def step(self, state, motion, scan):
+            pass
+
+    with pytest.raises(PluginError, match=r"Forgets failed on Ranges of 'uwb' at .*cannot unpack"):
+        updates_of(Forgets(), STREAM)
+
+
 def test_estimator_that_fails_on_a_scan_is_named_with_its_time_and_sensor():
     with pytest.raises(PluginError, match=r"FailsToStep failed on Ranges of 'uwb' at 2000000000 ns: .*no such weight"):
         updates_of(FailsToStep(), STREAM)
@@ -207,6 +236,10 @@ def test_failure_says_what_to_do():
 
 
 def test_error_of_our_own_passes_as_it_is():
+    class RefusesToStart(Ledger):
+        def start(self, prior, seed):
+            raise ParameterError("give another seed")
+
     class Refuses(Ledger):
         def step(self, state, motion, scan):
             raise ParameterError("give another number")
@@ -214,6 +247,8 @@ def test_error_of_our_own_passes_as_it_is():
         def estimate(self, state, motion, time_ns):
             raise ParameterError("give another time")
 
+    with pytest.raises(ParameterError, match="give another seed"):
+        Tracker(RefusesToStart(), WORLD, PRIOR)
     with pytest.raises(ParameterError, match="give another number"):
         updates_of(Refuses(), STREAM)
     with pytest.raises(ParameterError, match="give another time"):

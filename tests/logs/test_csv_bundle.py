@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from fusion import Gyro, Odometry, Ranges, RecordingError, WheelTicks, WifiScan
+from fusion import Gyro, LogError, Odometry, Ranges, RecordingError, WheelTicks, WifiScan
+from fusion.cli.main import main
 from logs.cli.import_ import import_recordings
 from logs.reader import read_run
 
@@ -147,3 +148,26 @@ def test_bundle_without_world_is_refused(bundle):
     (bundle / "world.toml").unlink()
     with pytest.raises(RecordingError, match=r"no world\.toml"):
         imported(bundle)
+
+
+def test_log_that_exists_is_written_over_only_by_force(bundle, tmp_path, capsys):
+    output = tmp_path / "run.mcap"
+    output.write_bytes(b"the only copy")
+    words = ["import", "csv", str(bundle), "-o", str(output)]
+    assert main(words) == 1
+    assert "run.mcap: exists already; choose another name, or write over a file with --force" in capsys.readouterr().err
+    assert output.read_bytes() == b"the only copy"
+    assert main([*words, "--force"]) == 0
+    assert read_run(output).measurements
+
+
+def test_folder_gets_no_log_where_one_of_that_name_exists(bundle, tmp_path):
+    (tmp_path / "out").mkdir()
+    (there := tmp_path / "out" / f"{bundle.name}.mcap").write_bytes(b"the only copy")
+    with pytest.raises(LogError, match="exists already"):
+        import_recordings("csv", bundle, tmp_path / "out")
+    assert there.read_bytes() == b"the only copy"
+    there.unlink()
+    there.mkdir()
+    with pytest.raises(LogError, match="exists already"):
+        import_recordings("csv", bundle, tmp_path / "out", force=True)

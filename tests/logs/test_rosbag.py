@@ -432,7 +432,7 @@ def test_command_line_imports_a_bag_and_tells_what_is_doubtful(tmp_path, ros, dr
     assert told.err.startswith("warning: ")
     assert "it may be in /mocap" in told.err
     assert read_run(tmp_path / "run.mcap").metadata["warnings"] in told.err
-    words += ["--topic", "truth=/mocap", "--truth-to-map", "1", "2", "0"]
+    words += ["--topic", "truth=/mocap", "--truth-to-map", "1", "2", "0", "--force"]
     assert main(words) == 0
     assert not capsys.readouterr().err
     assert read_run(tmp_path / "run.mcap").truth.x.tolist() == [1.0 + x for _, x, _, _ in POSES]

@@ -27,7 +27,8 @@ from benchmarks.runner.results import flat, read_results
 from benchmarks.runner.run_source import open_run
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite import EstimatorSpec, load_suite
+from benchmarks.runner.suite import EstimatorSpec
+from benchmarks.runner.suite_file import load_suite
 from fusion import FusionError, SuiteError, registered
 from fusion.cli.main import main
 from logs.prior import begin_ns
@@ -391,7 +392,7 @@ def test_run_tells_why_cells_were_lost(tmp_path, capsys):
     assert main(["bench", "run", str(tmp_path / "small.toml"), "--store", str(tmp_path / "store"), "-j", "1"]) == 0
     told = capsys.readouterr().err
     assert "4 crashed, 8 ok" in told
-    assert "none lost 4 of its cells: particle failed: " in told
+    assert "none lost 4 of its cells: Particle failed at its start: MemoryError" in told
 
 
 def test_damaged_track_is_told_not_traced(suite, tmp_path):
