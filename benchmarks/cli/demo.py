@@ -24,7 +24,7 @@ from benchmarks.runner.adhoc_suite import bench, remarks, tables, write_records
 from benchmarks.runner.results import Result
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite import load_suite
+from benchmarks.runner.suite_file import load_suite
 from fusion import FusionError, ViewerError
 from fusion.cli.arguments import not_negative
 from fusion.output.files import write

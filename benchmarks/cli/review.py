@@ -14,7 +14,7 @@ from benchmarks.review.reviewed_run import own_log, remarks
 from benchmarks.review.scene import SUFFIX
 from benchmarks.review.window import serve_web
 from benchmarks.runner.run_source import open_run
-from benchmarks.runner.suite import load_suite
+from benchmarks.runner.suite_file import load_suite
 from fusion import ParameterError
 from fusion.cli.arguments import at_least_one, not_negative, since_start
 from fusion.cli.options import parse_settings

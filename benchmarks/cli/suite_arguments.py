@@ -9,7 +9,8 @@ from pathlib import Path
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import Result, read_results, refuse_incomplete
 from benchmarks.runner.store import STORE, Store
-from benchmarks.runner.suite import Suite, load_suite
+from benchmarks.runner.suite import Suite
+from benchmarks.runner.suite_file import load_suite
 
 
 def suite_options(parser: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ import fusion
 from benchmarks.cli import demo as module
 from benchmarks.cli.demo import demo, next_commands, program
 from benchmarks.review.reviewed_run import own_log
-from benchmarks.runner.suite import load_suite
+from benchmarks.runner.suite_file import load_suite
 from fusion import ViewerError
 from logs.reader import read_run
 

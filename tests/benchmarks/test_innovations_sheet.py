@@ -14,7 +14,7 @@ from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite import load_suite
+from benchmarks.runner.suite_file import load_suite
 
 WIFI, RANGES = 0, 1
 N = 4000

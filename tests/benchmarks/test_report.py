@@ -22,7 +22,7 @@ from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import by_estimator, read_results
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite import load_suite
+from benchmarks.runner.suite_file import load_suite
 from fusion.cli.main import main
 from fusion.output.html import as_html
 from logs.reader import read_run

@@ -20,7 +20,7 @@ from benchmarks.report.report_data import ReportData
 from benchmarks.report.sensitivity import curves, sweeps
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite import load_suite
+from benchmarks.runner.suite_file import load_suite
 from fusion.cli.main import main
 from fusion.output.figures import as_png, plain_colour
 from tests.benchmarks.browser import CHROMIUM, chromium

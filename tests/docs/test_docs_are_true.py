@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.runner.suite import load_suite
+from benchmarks.runner.suite_file import load_suite
 from fusion import World
 from fusion.cli.main import VERBS
 

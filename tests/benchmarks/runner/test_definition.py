@@ -2,7 +2,8 @@
 
 import pytest
 
-from benchmarks.runner.suite import CLEAN, load_suite
+from benchmarks.runner.suite import CLEAN
+from benchmarks.runner.suite_file import load_suite
 from fusion import SuiteError
 
 SUITE = """

@@ -13,7 +13,7 @@ from benchmarks.runner.execute import carry_out
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite import load_suite
+from benchmarks.runner.suite_file import load_suite
 from estimators.dead_reckoning import DeadReckoning
 from fusion import Pose
 from fusion.values import nanoseconds

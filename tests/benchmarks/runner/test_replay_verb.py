@@ -6,7 +6,7 @@ from benchmarks.runner.estimator_run import run_estimator
 from benchmarks.runner.execute import carry_out, faulty_run
 from benchmarks.runner.replay_log import one_cell, replay_cell
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite import load_suite
+from benchmarks.runner.suite_file import load_suite
 from fusion.cli.main import main
 from logs.reader import read_run
 

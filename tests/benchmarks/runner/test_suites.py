@@ -9,7 +9,8 @@ import pytest
 
 from benchmarks.runner import suite as definition
 from benchmarks.runner.plan import estimator_identity, read_faults
-from benchmarks.runner.suite import builtin_suites, load_suite
+from benchmarks.runner.suite import builtin_suites
+from benchmarks.runner.suite_file import load_suite
 from fusion import SuiteError
 from fusion.cli.main import main
 from logs.cli.import_ import KINDS

@@ -18,7 +18,8 @@ from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import comparison, flat, score_matrix
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite import EstimatorSpec, FaultSet, Gate, RunSource, load_suite
+from benchmarks.runner.suite import EstimatorSpec, FaultSet, Gate, RunSource
+from benchmarks.runner.suite_file import load_suite
 from benchmarks.runner.timing import measure
 from benchmarks.runner.verify import differing
 from benchmarks.runner.workers import Limits
