@@ -26,7 +26,7 @@ from benchmarks.review.listing import line
 from benchmarks.review.moments import worst_moments
 from benchmarks.review.radio_circles import heard
 from benchmarks.review.viewer import require_rerun
-from benchmarks.runner.leaderboard import leaderboard
+from benchmarks.runner.leaderboard import COST_COLUMN, leaderboard
 from fusion.output.files import require_place, write
 from fusion.output.tables import as_markdown
 from logs.run import Run
@@ -105,8 +105,12 @@ def _worst(run: Run, drawn: Sequence[Drawing], start_ns: int) -> str:
 
 
 def markdown(drawn: Sequence[Drawing]) -> str:
-    """The table of scores, the best first, and why an estimator is missing from it."""
-    table = leaderboard("Scores", [entry_of(drawing.reviewed) for drawing in drawn], (*COLUMNS, *AGES))
+    """The table of scores, the best first, and why an estimator is missing from it. Its place is narrow, and the view's
+    name states the units.
+    """
+    table = leaderboard("", [entry_of(drawing.reviewed) for drawing in drawn], (*COLUMNS, COST_COLUMN, *AGES))
+    head = ("estimator", *(title.partition("\n")[0] for title in table.head[1:]))
+    _, _, text = as_markdown(table._replace(head=head)).partition("\n\n")
     ends = [(drawing.name, drawing.score.end) for drawing in drawn]
     lost = [f"\n{name} {end.status}: {end.error}" for name, end in ends if end.error is not None]
-    return "\n".join([as_markdown(table), *lost]) + "\n"
+    return "\n".join([text, *lost]) + "\n"

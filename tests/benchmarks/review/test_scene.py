@@ -373,10 +373,10 @@ def test_estimator_without_answers_and_crashed_one_have_a_legend_and_no_track(tm
 def test_score_table_ranks_the_live_first_and_tells_the_crash(tmp_path):
     run = run_of(tmp_path)
     lines = markdown(drawings(run, scored(run, ["broken", "toy"]))).splitlines()
-    assert lines[2].endswith("| age s | gaps |")
-    assert lines[4].startswith("| toy | 50.0 |")
-    assert lines[4].endswith(" | 0 |")
-    assert lines[5].startswith("| broken (crashed) |")
+    assert lines[0].endswith("| avail. | time | age | gaps |")
+    assert lines[2].startswith("| toy | 50.0 |")
+    assert lines[2].endswith(" | 0 |")
+    assert lines[3].startswith("| broken (crashed) |")
     assert "on purpose" in lines[-1]
 
 
@@ -398,7 +398,7 @@ def test_answer_that_is_no_number_is_told_beside_the_table_and_draws_no_error(tm
         run = run_of(tmp_path)
         reviewed = scored(run, ["poisoned", "toy"])
     table = markdown(drawings(run, reviewed)).splitlines()
-    row, told = table[5], table[-1]
+    row, told = table[3], table[-1]
     assert row.startswith("| poisoned (diverged) | – | – | ∞ |")
     assert told.startswith("poisoned diverged: it answers x nan m, y 0.5 m, heading 0 rad, 2 s after its first answer")
     (scene,) = write_scene(tmp_path / "review.rrd", run_of(tmp_path), reviewed)
