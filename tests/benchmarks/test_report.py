@@ -379,7 +379,7 @@ def test_estimator_that_crashed_everywhere_leaves_a_page_that_says_why_and_draws
     ((cell, status, why),) = rows_of(page, "Lost cells")
     assert (status, cell) == ("crashed", "[office broken clean 0](#cell-0)")
     assert why.startswith("`")
-    assert "particle failed: " in why
+    assert "Particle failed at its start: MemoryError" in why
     assert "data:image" not in page
     assert "1 run, 1 estimator, no faults, 1 seed: 1 cell." in page
 

@@ -39,7 +39,7 @@ def bundle(folder, spoil):
 
 
 def imported(folder, log):
-    assert main(["import", "csv", str(folder), "-o", str(log)]) == 0
+    assert main(["import", "csv", str(folder), "-o", str(log), "--force"]) == 0
     return read_run(log)
 
 
