@@ -75,14 +75,14 @@ class Advice(NamedTuple):
 
 @unique
 class Level(Enum):
-    """How much a remark matters; the values are those of diagnostic_msgs/DiagnosticStatus."""
+    """How much a diagnostic matters; the values are those of diagnostic_msgs/DiagnosticStatus."""
 
     OK = 0
     WARN = 1
     ERROR = 2
 
 
-class Remark(NamedTuple):
+class Diagnostic(NamedTuple):
     """What a device says that is no measurement: an aborted scan, a failed ranging, its own position, a temperature.
 
     Kept in the log; no estimator sees it. ``values`` are names with numbers or words.
@@ -95,7 +95,7 @@ class Remark(NamedTuple):
     values: tuple[tuple[str, str], ...] = ()
 
 
-Said: TypeAlias = Measurement | Truth | Remark
+DriverOutput: TypeAlias = Measurement | Truth | Diagnostic
 """What a driver hands over. Only a simulated robot knows the `Truth`."""
 
 
@@ -154,9 +154,9 @@ class Driver(Protocol):
         `DriverError` says why. Closed drivers may be opened again.
         """
 
-    def poll(self, timeout_s: float) -> Sequence[Said]:
+    def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
         """What came, waiting at most about ``timeout_s``; empty when nothing did. A reading that cannot be understood
-        costs that reading alone and is told as a `Remark`. Raises `DeviceLostError` when the device is gone.
+        costs that reading alone and is told as a `Diagnostic`. Raises `DeviceLostError` when the device is gone.
         """
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Messages about the devices of a recording: what they remark, and how the clocks of its computer stand to each other.
+"""Messages about the devices of a recording: their diagnostics, and the offsets between the clocks of its computer.
 
 Kept apart from `logs.messages`: no estimator sees any of them.
 """
@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from fusion import Level, Remark
+from fusion import Diagnostic, Level
 from logs.cdr import Unpacker
 from logs.messages import stamped, take_header
 
-REMARKS = ("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+DIAGNOSTICS = ("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
 CLOCKS = ("/clock_sync", "fusion_msgs/msg/ClockSync")
 
 
@@ -24,24 +24,26 @@ class ClockSync(NamedTuple):
     ntp_synced: bool
 
 
-def encode_remark(remark: Remark) -> bytes:
-    """A remark as an array of one status."""
-    message = stamped(remark.time_ns, remark.sensor).put("I", 1).put("b", remark.level.value)
-    message.text(remark.sensor).text(remark.text).text("").put("I", len(remark.values))
-    for key, value in remark.values:
+def encode_diagnostic(diagnostic: Diagnostic) -> bytes:
+    """A diagnostic as an array of one status."""
+    message = stamped(diagnostic.time_ns, diagnostic.sensor).put("I", 1).put("b", diagnostic.level.value)
+    message.text(diagnostic.sensor).text(diagnostic.text).text("").put("I", len(diagnostic.values))
+    for key, value in diagnostic.values:
         message.text(key).text(value)
     return message.message()
 
 
-def decode_remark(data: bytes) -> Remark:
-    """A remark from its message."""
+def decode_diagnostic(data: bytes) -> Diagnostic:
+    """A diagnostic from its message."""
     cursor = Unpacker(data)
     time_ns, _ = take_header(cursor)
     if (count := cursor.whole()) != 1:
         raise ValueError(f"an array of {count} statuses is none of ours")
     level, sensor, text = Level(min(cursor.whole("b"), Level.ERROR.value)), cursor.text(), cursor.text()
     cursor.text()
-    return Remark(time_ns, sensor, level, text, tuple((cursor.text(), cursor.text()) for _ in range(cursor.whole())))
+    return Diagnostic(
+        time_ns, sensor, level, text, tuple((cursor.text(), cursor.text()) for _ in range(cursor.whole()))
+    )
 
 
 def encode_clock(sync: ClockSync) -> bytes:

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from typing import Any
 
-from fusion import Level, Remark
+from fusion import Diagnostic, Level
 from fusion.values import nanoseconds, seconds
 from logs.device_messages import ClockSync
 
@@ -16,11 +16,11 @@ STEP_NS = nanoseconds(0.05)
 """Least step of the wall clock against the time since boot that is told; NTP slews by less than this in ten seconds."""
 MOST_TOLD = 10
 STATE, RUNNING = "state", "running"
-"""What remarks on a sensor by its recorder hold, and its value while all is well."""
+"""The key of a sensor's state in the diagnostics of its recorder, and its value while all is well."""
 OPENED = "opened"
-"""The text of the remark by which a recorder tells what a device says of itself."""
+"""The text of the diagnostic by which a recorder tells what a device says of itself."""
 STATUS = "status"
-"""The text of the remark by which a recorder tells, each second, how a sensor does."""
+"""The text of the diagnostic by which a recorder tells, each second, how a sensor does."""
 
 
 def wall_clock(clocks: Sequence[ClockSync], start_ns: int) -> dict[str, Any] | None:
@@ -45,31 +45,33 @@ def wall_clock(clocks: Sequence[ClockSync], start_ns: int) -> dict[str, Any] | N
     }
 
 
-def devices(remarks: Sequence[Remark]) -> dict[str, dict[str, str]]:
+def devices(diagnostics: Sequence[Diagnostic]) -> dict[str, dict[str, str]]:
     """What each device says of itself, by the name of its sensor: its last opening counts."""
-    return {remark.sensor: dict(remark.values) for remark in remarks if remark.text == OPENED}
+    return {diagnostic.sensor: dict(diagnostic.values) for diagnostic in diagnostics if diagnostic.text == OPENED}
 
 
-def complaints(remarks: Sequence[Remark]) -> list[tuple[str, int]]:
+def complaints(diagnostics: Sequence[Diagnostic]) -> list[tuple[str, int]]:
     """What went wrong with sensors, most frequent first, with its count; the states told each second are left out."""
-    bad = (r for r in remarks if r.level is not Level.OK and r.text != STATUS)
+    bad = (r for r in diagnostics if r.level is not Level.OK and r.text != STATUS)
     return Counter(map(as_line, bad)).most_common(MOST_TOLD)
 
 
-def as_line(remark: Remark) -> str:
-    """A remark with the name of its sensor, which errors of drivers say by themselves."""
-    return remark.text if remark.text.startswith(remark.sensor) else f"{remark.sensor}: {remark.text}"
+def as_line(diagnostic: Diagnostic) -> str:
+    """A diagnostic with the name of its sensor, which errors of drivers say by themselves."""
+    return (
+        diagnostic.text if diagnostic.text.startswith(diagnostic.sensor) else f"{diagnostic.sensor}: {diagnostic.text}"
+    )
 
 
-def is_down(remark: Remark) -> bool:
-    """Whether a recorder remarks that the sensor does not run: it is lost, or not there yet."""
-    return dict(remark.values).get(STATE, RUNNING) != RUNNING
+def is_down(diagnostic: Diagnostic) -> bool:
+    """Whether a diagnostic of the recorder states that the sensor does not run: it is lost, or not there yet."""
+    return dict(diagnostic.values).get(STATE, RUNNING) != RUNNING
 
 
-def dropped(remarks: Sequence[Remark]) -> dict[str, int]:
+def dropped(diagnostics: Sequence[Diagnostic]) -> dict[str, int]:
     """Messages that a recorder lost because it was too slow, by the name of the sensor that lost any."""
     counts: dict[str, int] = {}
-    for remark in remarks:
-        if remark.text == STATUS:
-            counts[remark.sensor] = int(dict(remark.values).get("dropped", "0"))
+    for diagnostic in diagnostics:
+        if diagnostic.text == STATUS:
+            counts[diagnostic.sensor] = int(dict(diagnostic.values).get("dropped", "0"))
     return {sensor: count for sensor, count in counts.items() if count}

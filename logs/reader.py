@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from mcap.records import Message
 
-from fusion import BeliefError, Estimate, FusionError, LogError, Measurement, Prior, Remark, Truth, World
+from fusion import BeliefError, Diagnostic, Estimate, FusionError, LogError, Measurement, Prior, Truth, World
 from logs import device_messages, messages
 from logs.device_messages import ClockSync
 from logs.message_stream import Walk
@@ -31,7 +31,7 @@ class _Contents:
     truths: list[Truth] = field(default_factory=list)
     prior: Prior | None = None
     lanes: dict[str, list[Estimate]] = field(default_factory=dict)
-    remarks: list[Remark] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
     clocks: list[ClockSync] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
     unreadable: dict[str, int] = field(default_factory=dict)
@@ -70,7 +70,7 @@ def read_log(path: Path) -> Log:
         truth=TruthTrack.from_truths(contents.truths) or None,
         warnings=(*walk.warnings, *_warnings(path, contents, world), *_cautions(path, contents, world)),
         lanes={name: tuple(estimates) for name, estimates in contents.lanes.items()},
-        remarks=tuple(contents.remarks),
+        diagnostics=tuple(contents.diagnostics),
         clocks=tuple(contents.clocks),
     )
     return Log(run, contents.measurements, walk.damage)
@@ -120,8 +120,8 @@ def _take(contents: _Contents, topic: str, schema: str, message: Message) -> Non
         elif topic.startswith(ESTIMATE_TOPIC):
             estimate = messages.decode_estimate(message.data)
             contents.lanes.setdefault(topic.removeprefix(ESTIMATE_TOPIC), []).append(estimate)
-        elif topic == device_messages.REMARKS[0]:
-            contents.remarks.append(device_messages.decode_remark(message.data))
+        elif topic == device_messages.DIAGNOSTICS[0]:
+            contents.diagnostics.append(device_messages.decode_diagnostic(message.data))
         elif topic == device_messages.CLOCKS[0]:
             contents.clocks.append(device_messages.decode_clock(message.data))
         elif schema in DECODERS:
@@ -156,7 +156,7 @@ def _warnings(path: Path, contents: _Contents, world: World) -> tuple[str, ...]:
 def _cautions(path: Path, contents: _Contents, world: World) -> Iterator[str]:
     """What makes the run misleading though all of it can be read."""
     measurements = [measurement for _, measurement in contents.measurements]
-    if found := caution_of_run(world.robot, measurements, contents.remarks):
+    if found := caution_of_run(world.robot, measurements, contents.diagnostics):
         # A later part of a recording begins with a command that stands in an earlier one.
         is_part = contents.record.get("split", "0") != "0"
         yield f"{path}: {found._replace(cure='join the parts of the recording (`fusion join`)') if is_part else found}"

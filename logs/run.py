@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fusion import Estimate, Measurement, Prior, Remark, World
+from fusion import Diagnostic, Estimate, Measurement, Prior, World
 from fusion.timeline import Key
 from logs.device_messages import ClockSync
 from logs.truth import TruthTrack
@@ -27,8 +27,8 @@ def left_out(placed: Sequence[bool]) -> list[str]:
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
     """One recorded run. ``measurements`` stand in the order they arrived; ``lanes`` holds the estimates of estimators
-    that were replayed into the log, by name; ``remarks`` are what the devices said that is no measurement, ``clocks``
-    how the clocks of the recording computer stood to each other. ``true_stamps``: where a wrong clock stamped a
+    that were replayed into the log, by name; ``diagnostics`` come from the devices and are no measurements, ``clocks``
+    are the offsets between the clocks of the recording computer. ``true_stamps``: where a wrong clock stamped a
     measurement, the time a right one would have stamped it with [ns], by `fusion.timeline.order`; empty but for runs
     that were given that fault.
     """
@@ -42,6 +42,6 @@ class Run:
     truth: TruthTrack | None
     warnings: tuple[str, ...]
     lanes: Mapping[str, tuple[Estimate, ...]]
-    remarks: tuple[Remark, ...] = ()
+    diagnostics: tuple[Diagnostic, ...] = ()
     clocks: tuple[ClockSync, ...] = ()
     true_stamps: Mapping[Key, int] = field(default_factory=dict)

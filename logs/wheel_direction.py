@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable
 
-from fusion import Advice, Measurement, MotorCommand, Remark, Said, Truth, WheelTicks
+from fusion import Advice, Diagnostic, DriverOutput, Measurement, MotorCommand, Truth, WheelTicks
 from fusion.timeline import order
 from fusion.values import seconds
 from fusion.world import DRIVES, Robot
@@ -35,22 +35,27 @@ def caution(robot: Robot, kinds: Collection[type[Measurement | Truth]], where: s
     )
 
 
-def caution_of_run(robot: Robot, measurements: Collection[Measurement], remarks: Iterable[Remark]) -> Advice | None:
+def caution_of_run(
+    robot: Robot, measurements: Collection[Measurement], diagnostics: Iterable[Diagnostic]
+) -> Advice | None:
     """The same for what was recorded: all of it without motor commands, or the parts where none held. A robot that
     stood needs none.
     """
     if caution(robot, {WheelTicks}) is None:
         return None  # the encoders see it: most logs need no closer look
     watch = DirectionWatch(robot)
-    stamped = [*((order(m), m) for m in measurements), *((_order(remark), remark) for remark in remarks)]
+    stamped = [
+        *((order(m), m) for m in measurements),
+        *((_order(diagnostic), diagnostic) for diagnostic in diagnostics),
+    ]
     for _, said in sorted(stamped, key=lambda row: row[0]):
         watch.take(said)
     return watch.caution and (caution(robot, {type(measurement) for measurement in measurements}) or watch.caution)
 
 
-def _order(remark: Remark) -> tuple[int, int, str, int]:
+def _order(diagnostic: Diagnostic) -> tuple[int, int, str, int]:
     """Before any measurement of the same time: a command that comes with the return of its sensor holds."""
-    return remark.time_ns, -1, remark.sensor, 0
+    return diagnostic.time_ns, -1, diagnostic.sensor, 0
 
 
 class DirectionWatch:
@@ -71,15 +76,15 @@ class DirectionWatch:
         self._start_ns: int | None = None
         self._missed_ns: int | None = None
 
-    def take(self, said: Said) -> None:
-        """Follow one thing that a sensor measured, or that was remarked on it."""
+    def take(self, said: DriverOutput) -> None:
+        """Follow one thing that a sensor measured, or a diagnostic of it."""
         if isinstance(said, MotorCommand) and all(map(math.isfinite, said.wheel_speeds_m_s)):
             self._commanders.add(said.sensor)
             pairs = zip(self._is_known, said.wheel_speeds_m_s, strict=False)
             self._is_known = [known or speed != 0.0 for known, speed in pairs]
         elif isinstance(said, WheelTicks):
             self._roll(said)
-        elif isinstance(said, Remark) and is_down(said):
+        elif isinstance(said, Diagnostic) and is_down(said):
             self.lose(said.sensor)
 
     def lose(self, sensor: str) -> None:

@@ -20,7 +20,7 @@ from typing import IO
 from mcap.records import Message
 from mcap.writer import Writer
 
-from fusion import LogError, Measurement, PluginError, Prior, Remark, Truth, Update, World
+from fusion import Diagnostic, LogError, Measurement, PluginError, Prior, Truth, Update, World
 from fusion.values import nanoseconds
 from logs import device_messages, messages
 from logs.device_messages import ClockSync
@@ -88,10 +88,12 @@ class RunWriter:
         log_ns = truth.time_ns if log_time_ns is None else log_time_ns
         self._add(*messages.TRUTH, log_ns, truth.time_ns, 0, messages.encode_truth(truth))
 
-    def write_remark(self, remark: Remark, *, log_time_ns: int | None = None) -> None:
-        """Append what a device remarked; ``log_time_ns`` says when that arrived."""
-        log_ns = remark.time_ns if log_time_ns is None else log_time_ns
-        self._add(*device_messages.REMARKS, log_ns, remark.time_ns, 0, device_messages.encode_remark(remark))
+    def write_diagnostic(self, diagnostic: Diagnostic, *, log_time_ns: int | None = None) -> None:
+        """Append a diagnostic of a device; ``log_time_ns`` says when that arrived."""
+        log_ns = diagnostic.time_ns if log_time_ns is None else log_time_ns
+        self._add(
+            *device_messages.DIAGNOSTICS, log_ns, diagnostic.time_ns, 0, device_messages.encode_diagnostic(diagnostic)
+        )
 
     def write_clock(self, sync: ClockSync) -> None:
         """Append how the clocks of this computer stand to each other."""

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from benchmarks.review.canvas import Canvas
-from fusion import Gyro, Level, Measurement, MotorCommand, Odometry, Remark, WheelTicks, World
+from fusion import Diagnostic, Gyro, Level, Measurement, MotorCommand, Odometry, WheelTicks, World
 from fusion.arrays import Floats, Stamps
 from fusion.output.colours import PALETTE
 from fusion.values import NANOSECONDS
@@ -82,14 +82,14 @@ DEVICES = "devices"
 LEVELS = {Level.OK: "INFO", Level.WARN: "WARN", Level.ERROR: "ERROR"}
 
 
-def worth_a_line(run: Run) -> Sequence[Remark]:
-    """Remarks that are no routine: what is told each second, or beside each scan, is left out."""
-    return [r for r in run.remarks if r.text == OPENED or (r.level is not Level.OK and r.text != STATUS)]
+def worth_a_line(run: Run) -> Sequence[Diagnostic]:
+    """Diagnostics that are no routine: what is told each second, or beside each scan, is left out."""
+    return [r for r in run.diagnostics if r.text == OPENED or (r.level is not Level.OK and r.text != STATUS)]
 
 
-def draw_device_events(canvas: Canvas, remarks: Sequence[Remark]) -> None:
+def draw_device_events(canvas: Canvas, diagnostics: Sequence[Diagnostic]) -> None:
     """A line for each; nothing for a run without."""
-    if remarks:
-        time_ns = np.array([remark.time_ns for remark in remarks], dtype=np.int64)
-        levels = [LEVELS[remark.level] for remark in remarks]
-        canvas.text(["events", DEVICES], time_ns, levels, [as_line(remark) for remark in remarks])
+    if diagnostics:
+        time_ns = np.array([diagnostic.time_ns for diagnostic in diagnostics], dtype=np.int64)
+        levels = [LEVELS[diagnostic.level] for diagnostic in diagnostics]
+        canvas.text(["events", DEVICES], time_ns, levels, [as_line(diagnostic) for diagnostic in diagnostics])

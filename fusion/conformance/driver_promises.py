@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple, TypeAlias, cast
 
 from fusion.conformance.checks import Outcome, Verdict
-from fusion.driver import BootClock, DeviceInfo, Driver, DriverSpec, FakeDevice, Found, Level, Remark, Said
+from fusion.driver import BootClock, DeviceInfo, Diagnostic, Driver, DriverOutput, DriverSpec, FakeDevice, Found, Level
 from fusion.errors import ConformanceError, DependencyError, DeviceLostError, DriverError, SettingError
 from fusion.plugins import SENSORS, load
 from fusion.values import Truth, seconds
@@ -84,9 +84,9 @@ def _playing(made: Kind) -> Iterator[tuple[Driver, FakeDevice]]:
             driver.close()
 
 
-def _listen(driver: Driver, until: Callable[[Said], bool]) -> list[Said]:
+def _listen(driver: Driver, until: Callable[[DriverOutput], bool]) -> list[DriverOutput]:
     """What the driver says until something is as wanted; gives up after many polls."""
-    heard: list[Said] = []
+    heard: list[DriverOutput] = []
     for _ in range(TRIES):
         heard += driver.poll(POLL_S)
         if any(until(said) for said in heard):
@@ -94,11 +94,11 @@ def _listen(driver: Driver, until: Callable[[Said], bool]) -> list[Said]:
     return heard
 
 
-def _is_measurement(said: Said) -> bool:
-    return not isinstance(said, Remark)
+def _is_measurement(said: DriverOutput) -> bool:
+    return not isinstance(said, Diagnostic)
 
 
-def _measured(said: Sequence[Said]) -> list[Any]:
+def _measured(said: Sequence[DriverOutput]) -> list[Any]:
     return [one for one in said if _is_measurement(one)]
 
 
@@ -153,7 +153,7 @@ def _measures(made: Kind) -> None:
         for said in heard:
             name = NAME if isinstance(said, Truth) else said.sensor
             _require(name == NAME, f"{said} goes by the name {name!r}, not {NAME!r}")
-            _require(isinstance(said, (*driver.spec.kinds, Remark)), f"{said} is of no kind that its spec names")
+            _require(isinstance(said, (*driver.spec.kinds, Diagnostic)), f"{said} is of no kind that its spec names")
 
 
 @_promise("stamps_honestly", "a stamp is when it was true: never in the future, never before the device was opened")
@@ -198,8 +198,10 @@ def _survives_garbage(made: Kind) -> None:
     with _playing(made) as (driver, device):
         driver.open()
         device.garble()
-        told = _listen(driver, lambda said: isinstance(said, Remark) and said.level is not Level.OK)
-        _require(any(isinstance(said, Remark) for said in told), "the device said nonsense and no remark tells of it")
+        told = _listen(driver, lambda said: isinstance(said, Diagnostic) and said.level is not Level.OK)
+        _require(
+            any(isinstance(said, Diagnostic) for said in told), "the device said nonsense and no diagnostic tells of it"
+        )
         device.speak()
         _require(_measured(_listen(driver, _is_measurement)), "after nonsense no measurement came any more")
 

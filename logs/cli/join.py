@@ -1,4 +1,4 @@
-"""`fusion join`: the files of one recording become one log, message for message, with what devices remarked."""
+"""`fusion join`: the files of one recording become one log, message for message, with the diagnostics of devices."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """`fusion sensors test`: every sensor of a robot run for a while, and a report of what was seen, to be attached.
 
 What only a person with the hardware can prove is proved by such a report: device, firmware, rates, the spread of the
-intervals, what was remarked, and on which computer.
+intervals, the diagnostics, and on which computer.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from fusion import BootClock, DriverError, FusionError, Remark, __version__
+from fusion import BootClock, Diagnostic, DriverError, FusionError, __version__
 from fusion.values import seconds
 from sensors.onboard.computer import clock_sync
 from sensors.onboard.driver_lifecycle import Keeper, Received, State
@@ -27,7 +27,7 @@ from sensors.onboard.robot_file import RobotFile, build_driver
 from sensors.onboard.supervisor import HUNG_S
 
 MODEL = Path("/proc/device-tree/model")
-LAST_REMARKS = 20
+LAST_DIAGNOSTICS = 20
 SECONDS = 20.0
 HUNG = {"state": State.STALLED.value, "error": "its device holds the driver up", "messages": 0}
 
@@ -65,8 +65,8 @@ def self_test(robot: RobotFile, duration_s: float = SECONDS) -> dict[str, Any]:
 
 def _row(keeper: Keeper, heard: Sequence[Received]) -> dict[str, Any]:
     """What one sensor said: its rate, the spread of its intervals, how old its messages were when they came."""
-    remarks = [one.said for one in heard if isinstance(one.said, Remark)]
-    said = [one for one in heard if not isinstance(one.said, Remark)]
+    diagnostics = [one.said for one in heard if isinstance(one.said, Diagnostic)]
+    said = [one for one in heard if not isinstance(one.said, Diagnostic)]
     intervals = [seconds(later.said.time_ns - earlier.said.time_ns) for earlier, later in pairwise(said)]
     ages = [seconds(one.received_ns - one.said.time_ns) for one in said]
     return {
@@ -79,7 +79,9 @@ def _row(keeper: Keeper, heard: Sequence[Received]) -> dict[str, Any]:
         "interval_s": _spread(intervals),
         "age_s": _spread(ages),
         "losses": keeper.losses,
-        "remarks": Counter(f"{remark.level.name} {remark.text}" for remark in remarks).most_common(LAST_REMARKS),
+        "diagnostics": Counter(f"{diagnostic.level.name} {diagnostic.text}" for diagnostic in diagnostics).most_common(
+            LAST_DIAGNOSTICS
+        ),
         "last": [repr(one.said) for one in said[-2:]],
     }
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import ClassVar, NamedTuple
 
-from fusion import Clock, DeviceInfo, DeviceLostError, DriverSpec, Level, Needs, Remark, Said, SettingError
+from fusion import Clock, DeviceInfo, DeviceLostError, Diagnostic, DriverOutput, DriverSpec, Level, Needs, SettingError
 from fusion.values import Gyro, nanoseconds, seconds
 
 AXES = {"x": 0, "y": 1, "z": 2}
@@ -67,7 +67,7 @@ class SampledGyro:
         self._due_ns = self._warm_ns = self._clock.now_ns()
         return DeviceInfo(model, settings={**self._settings, **settings})
 
-    def poll(self, timeout_s: float) -> Sequence[Said]:
+    def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
         """The next sample, if it falls due in time."""
         if not self._is_open:
             raise DeviceLostError(f"{self._name} is not open", "open the driver first")
@@ -82,7 +82,7 @@ class SampledGyro:
         try:
             sample = self._read()
         except UnreadableError as error:
-            return [self._remark(began_ns, Level.WARN, str(error))]
+            return [self._diagnostic(began_ns, Level.WARN, str(error))]
         return list(self._said(sample, (began_ns + self._clock.now_ns()) // 2))
 
     def close(self) -> None:
@@ -102,7 +102,7 @@ class SampledGyro:
         """One sample; raises `UnreadableError` or a `DriverError`."""
         raise NotImplementedError
 
-    def _said(self, sample: Sample, time_ns: int) -> Iterator[Said]:
+    def _said(self, sample: Sample, time_ns: int) -> Iterator[DriverOutput]:
         self._seq += 1
         rate = self._sign * sample.rate_rad_s[self._axis]
         yield Gyro(time_ns, self._name, self._seq, rate, sample.acceleration_m_s2)
@@ -112,7 +112,7 @@ class SampledGyro:
             values = [] if sample.temperature_c is None else [("temperature_c", f"{sample.temperature_c:.2f}")]
             values += [("samples missed", str(missed))] if missed else []
             if values:
-                yield self._remark(time_ns, Level.OK, "state of the chip", *values)
+                yield self._diagnostic(time_ns, Level.OK, "state of the chip", *values)
 
-    def _remark(self, time_ns: int, level: Level, text: str, *values: tuple[str, str]) -> Remark:
-        return Remark(time_ns, self._name, level, text, values)
+    def _diagnostic(self, time_ns: int, level: Level, text: str, *values: tuple[str, str]) -> Diagnostic:
+        return Diagnostic(time_ns, self._name, level, text, values)

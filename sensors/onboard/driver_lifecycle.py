@@ -2,9 +2,9 @@
 
     CLOSED → OPENING → RUNNING → STALLED → BACKOFF → OPENING …        FAILED: a person is needed
 
-A device that is not there at the start takes the same path as one that is lost on the way. One remark is made when a
-sensor goes and one when it is back, however many tries lie between. There is no thread here: `turn` does one step, so
-that a virtual clock can drive it through hours of trouble.
+A device that is not there at the start takes the same path as one that is lost on the way. There is one diagnostic for
+the loss of a sensor and one for its return, however many tries lie between. There is no thread here: `turn` does one
+step, so that a virtual clock can drive it through hours of trouble.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from enum import Enum, unique
 from typing import NamedTuple
 
-from fusion.driver import Clock, DeviceInfo, Driver, Level, Remark, Said
+from fusion.driver import Clock, DeviceInfo, Diagnostic, Driver, DriverOutput, Level
 from fusion.errors import DeviceLostError, DriverError
 from fusion.values import nanoseconds, seconds
 
@@ -41,7 +41,7 @@ class Received(NamedTuple):
     """Something a driver said, and when it reached us."""
 
     received_ns: int
-    said: Said
+    said: DriverOutput
 
 
 class Keeper:
@@ -73,7 +73,7 @@ class Keeper:
         return max(PERIODS_OF_SILENCE / least_hz, LEAST_SILENCE_S) if least_hz > 0.0 else float("inf")
 
     def turn(self, timeout_s: float) -> list[Received]:
-        """One step of at most about ``timeout_s``; what came, remarks on the driver itself among it."""
+        """One step of at most about ``timeout_s``; what came, diagnostics on the driver itself among it."""
         self.turned_ns = self._clock.now_ns()
         if self.state is State.FAILED:
             self._clock.sleep(timeout_s)
@@ -120,13 +120,13 @@ class Keeper:
         self.state = State.STALLED
         return self._lost(DeviceLostError(f"{self.name} has said nothing for {silent_s:.1f} s", "check its cable"))
 
-    def _heard(self, said: Sequence[Said], now_ns: int) -> list[Received]:
+    def _heard(self, said: Sequence[DriverOutput], now_ns: int) -> list[Received]:
         back = self._is_missed
         self._is_missed = False
         self.last_ns = now_ns
         if now_ns - self._opened_ns >= HEALTHY_NS:
             self._wait_s = FIRST_WAIT_S
-        news = [self._remark(Level.OK, f"{self.name} is back")] if back else []
+        news = [self._diagnostic(Level.OK, f"{self.name} is back")] if back else []
         return [*news, *(Received(now_ns, one) for one in said)]
 
     def _lost(self, error: DriverError) -> list[Received]:
@@ -135,7 +135,7 @@ class Keeper:
         self.error = error
         if self._fail_fast or not error.passes:
             self.state = State.FAILED
-            return [self._remark(Level.ERROR, str(error))]
+            return [self._diagnostic(Level.ERROR, str(error))]
         self.state = State.BACKOFF
         self._until_ns = self._clock.now_ns() + nanoseconds(self._wait_s * self._random.uniform(0.5, 1.0))
         self._wait_s = min(2.0 * self._wait_s, LONGEST_WAIT_S)
@@ -143,11 +143,11 @@ class Keeper:
             return []
         self._is_missed = True
         self.losses += 1
-        return [self._remark(Level.WARN, str(error))]
+        return [self._diagnostic(Level.WARN, str(error))]
 
-    def _remark(self, level: Level, text: str) -> Received:
+    def _diagnostic(self, level: Level, text: str) -> Received:
         now_ns = self._clock.now_ns()
-        return Received(now_ns, Remark(now_ns, self.name, level, text, (("state", self.state.value),)))
+        return Received(now_ns, Diagnostic(now_ns, self.name, level, text, (("state", self.state.value),)))
 
 
 def _unexpected(name: str, error: Exception) -> DriverError:

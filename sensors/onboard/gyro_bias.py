@@ -1,8 +1,8 @@
-"""The bias of a gyro while the robot stands: the wheels tell for nothing when that is.
+"""The bias of a gyro while the robot stands, which the wheels show.
 
-A bias is measured over five seconds in which no wheel counted and the gyro was quiet, and told as a remark of the gyro;
-the recording keeps the raw rates. One that differs from the last by more than a gyro drifts while it stands was a hand
-that turned the robot, and is told as that.
+A bias is measured over five seconds in which no wheel counted and the gyro was quiet, and reported as a diagnostic of
+the gyro; the recording keeps the raw rates. One that differs from the last by more than a gyro drifts while it stands
+was a hand that turned the robot, and is reported as such.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from statistics import fmean, stdev
 
-from fusion import Level, Remark, Said
+from fusion import Diagnostic, DriverOutput, Level
 from fusion.values import Gyro, WheelTicks, nanoseconds
 
 STAND_NS = nanoseconds(5.0)
@@ -30,7 +30,7 @@ class Standstill:
         self._rates: dict[str, list[float]] = {}
         self._last: dict[str, float] = {}
 
-    def hear(self, said: Said) -> list[Remark]:
+    def hear(self, said: DriverOutput) -> list[Diagnostic]:
         """The biases that ``said`` completes."""
         if isinstance(said, WheelTicks):
             return self._wheels(said)
@@ -38,7 +38,7 @@ class Standstill:
             self._rates.setdefault(said.sensor, []).append(said.rate_rad_s)
         return []
 
-    def _wheels(self, ticks: WheelTicks) -> list[Remark]:
+    def _wheels(self, ticks: WheelTicks) -> list[Diagnostic]:
         stands = self._counts.get(ticks.sensor) == ticks.counts
         self._counts[ticks.sensor] = ticks.counts
         if not stands:
@@ -48,11 +48,15 @@ class Standstill:
             self._since_ns = ticks.time_ns
         if ticks.time_ns - self._since_ns < STAND_NS:
             return []
-        told = [remark for sensor, rates in self._rates.items() for remark in self._bias(ticks.time_ns, sensor, rates)]
+        told = [
+            diagnostic
+            for sensor, rates in self._rates.items()
+            for diagnostic in self._bias(ticks.time_ns, sensor, rates)
+        ]
         self._since_ns, self._rates = ticks.time_ns, {}
         return told
 
-    def _bias(self, time_ns: int, sensor: str, rates: list[float]) -> list[Remark]:
+    def _bias(self, time_ns: int, sensor: str, rates: list[float]) -> list[Diagnostic]:
         if len(rates) < LEAST_SAMPLES or (spread := stdev(rates)) > QUIET_RAD_S:
             return []
         bias = fmean(rates)
@@ -67,4 +71,4 @@ class Standstill:
         }
         text = "turned while the wheels stood" if moved else "bias at standstill"
         named = tuple((key, repr(value)) for key, value in values.items())
-        return [Remark(time_ns, sensor, Level.WARN if moved else Level.OK, text, named)]
+        return [Diagnostic(time_ns, sensor, Level.WARN if moved else Level.OK, text, named)]

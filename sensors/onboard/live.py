@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 from fusion import (
     Decision,
+    Diagnostic,
     Estimate,
     Estimator,
     FusionError,
@@ -25,7 +26,6 @@ from fusion import (
     Measurement,
     Moment,
     ParameterError,
-    Remark,
     Timeline,
     Truth,
     World,
@@ -214,7 +214,7 @@ class _Fold:
 
     def _hear(self, received: Received) -> Answers:
         said = received.said
-        if isinstance(said, Truth | Remark):
+        if isinstance(said, Truth | Diagnostic):
             return ()
         self._measurements += 1
         moments = self._moments(said)
@@ -249,4 +249,4 @@ class _Fold:
         self._troubles[who] = trouble
         self._news.append(trouble)
         if self._recorder and who:
-            self._recorder.remark(Remark(now_ns, who, Level.ERROR, trouble))
+            self._recorder.diagnostic(Diagnostic(now_ns, who, Level.ERROR, trouble))

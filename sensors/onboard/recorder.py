@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import NamedTuple
 
-from fusion import Level, LogError, PluginError, Prior, Remark, Update
+from fusion import Diagnostic, Level, LogError, PluginError, Prior, Update
 from fusion.values import nanoseconds, seconds
 from logs.devices import STATUS
 from sensors.onboard.driver_lifecycle import Received, State
@@ -132,10 +132,10 @@ class Recorder:
         except LogError as error:
             self.trouble = str(error)
 
-    def remark(self, remark: Remark) -> None:
-        """Write a remark of our own."""
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Write a diagnostic of our own."""
         try:
-            self._log.write(Received(remark.time_ns, remark))
+            self._log.write(Received(diagnostic.time_ns, diagnostic))
         except LogError as error:
             self.trouble = str(error)
 
@@ -150,7 +150,7 @@ class Recorder:
     def _keep(self, report: Report, now_ns: int) -> None:
         self._log.write_devices(report.devices, now_ns)
         for status in report.statuses:
-            self._log.write(Received(now_ns, _as_remark(status, now_ns)))
+            self._log.write(Received(now_ns, _as_diagnostic(status, now_ns)))
 
     def _look_at_disk(self) -> None:
         lacks_mb = self._log.lacks_mb()
@@ -161,7 +161,7 @@ class Recorder:
         self._log.write_clock()
 
 
-def _as_remark(status: Status, now_ns: int) -> Remark:
+def _as_diagnostic(status: Status, now_ns: int) -> Diagnostic:
     values = tuple((key, str(value)) for key, value in status.record.items() if value not in (None, ""))
     level = {State.RUNNING: Level.OK, State.FAILED: Level.ERROR}.get(status.state, Level.WARN)
-    return Remark(now_ns, status.name, level, STATUS, values)
+    return Diagnostic(now_ns, status.name, level, STATUS, values)

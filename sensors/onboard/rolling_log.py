@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 
-from fusion import DeviceInfo, Level, LogError, Prior, Remark, Truth, Update, __version__
+from fusion import DeviceInfo, Diagnostic, Level, LogError, Prior, Truth, Update, __version__
 from fusion.values import nanoseconds
 from logs.devices import OPENED
 from logs.writer import RunWriter
@@ -61,14 +61,14 @@ class SplitLog:
     def write(self, received: Received) -> None:
         """Append what a driver said, at the time it was received."""
         said, at_ns = received.said, received.received_ns
-        if isinstance(said, Remark):
-            self._log.write_remark(said, log_time_ns=at_ns)
+        if isinstance(said, Diagnostic):
+            self._log.write_diagnostic(said, log_time_ns=at_ns)
         elif isinstance(said, Truth):
             self._log.write_truth(said, log_time_ns=at_ns)
         else:
             self._log.write(said, log_time_ns=at_ns)
-        for remark in self._standstill.hear(said):
-            self._log.write_remark(remark, log_time_ns=at_ns)
+        for diagnostic in self._standstill.hear(said):
+            self._log.write_diagnostic(diagnostic, log_time_ns=at_ns)
 
     def write_update(self, lane: str, update: Update, now_ns: int) -> None:
         """Append what the estimator of ``lane`` said to what was received at ``now_ns``."""
@@ -87,7 +87,7 @@ class SplitLog:
         for name, info in devices.items():
             if self._devices.get(name) is not info:
                 self._devices[name] = info
-                self._log.write_remark(_about(name, info, now_ns))
+                self._log.write_diagnostic(_about(name, info, now_ns))
 
     def split_if_due(self, now_ns: int) -> None:
         """Go on in a new file when this one is old or large enough."""
@@ -99,7 +99,7 @@ class SplitLog:
             self._began_ns = now_ns
             self._log = self._begin(None)
             for name, info in self._devices.items():
-                self._log.write_remark(_about(name, info, now_ns))
+                self._log.write_diagnostic(_about(name, info, now_ns))
 
     def lacks_mb(self) -> float:
         """How much less than the policy wants is free on the disk [MB], after the ring gave up what it may."""
@@ -150,11 +150,11 @@ def check_space(folder: Path, min_free_mb: float) -> None:
         )
 
 
-def _about(name: str, info: DeviceInfo, now_ns: int) -> Remark:
-    """A device as a remark."""
+def _about(name: str, info: DeviceInfo, now_ns: int) -> Diagnostic:
+    """A device as a diagnostic."""
     settings = json.dumps(dict(info.settings), default=str, sort_keys=True)
     values = (("model", info.model), ("serial", info.serial), ("firmware", info.firmware), ("settings", settings))
-    return Remark(now_ns, name, Level.OK, OPENED, values)
+    return Diagnostic(now_ns, name, Level.OK, OPENED, values)
 
 
 def _plain(name: str) -> str:

@@ -135,7 +135,7 @@ class Sensing:
     def _report(self) -> Report:
         tell_service_manager("WATCHDOG=1")
         statuses = self.statuses()
-        for status in statuses:  # one whose device holds it up remarks nothing
+        for status in statuses:  # one whose device holds it up reports nothing
             if status.state is not State.RUNNING:
                 self._direction.lose(status.name)
         failed = [status for status in statuses if status.state is State.FAILED]

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import NamedTuple
 
-from fusion.driver import Clock, Remark, Said
+from fusion.driver import Clock, Diagnostic, DriverOutput
 from fusion.errors import DeviceLostError, NotFoundError, did_you_mean
 from fusion.values import nanoseconds, seconds
 from sensors.onboard.driver_lifecycle import Keeper, Received, State
@@ -71,7 +71,7 @@ class Mailbox:
                 self._waiting.popleft()
                 self.dropped += 1
             for one in received:
-                if not isinstance(one.said, Remark):
+                if not isinstance(one.said, Diagnostic):
                     self.messages += 1
                     self.latest = one if self.latest is None or true_ns(one) >= true_ns(self.latest) else self.latest
                     self._arrivals_ns.append(one.received_ns)
@@ -144,7 +144,7 @@ class Supervisor:
         self._taken_ns = taken[-1].received_ns if taken else self._taken_ns
         return taken
 
-    def latest(self, name: str, max_age_s: float) -> Said:
+    def latest(self, name: str, max_age_s: float) -> DriverOutput:
         """The freshest thing that sensor ``name`` measured; raises `DeviceLostError` where that is older."""
         if name not in self._boxes:
             raise NotFoundError(f"there is no sensor {name!r}", did_you_mean(name, self._boxes))

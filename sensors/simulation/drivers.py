@@ -14,7 +14,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import ClassVar
 
-from fusion.driver import Clock, DeviceInfo, DriverSpec, Found, Level, Remark, Said, VirtualClock
+from fusion.driver import Clock, DeviceInfo, Diagnostic, DriverOutput, DriverSpec, Found, Level, VirtualClock
 from fusion.errors import DeviceLostError, NotFoundError, SettingError, WorldError
 from fusion.values import Gyro, Measurement, MotorCommand, Ranges, Truth, WheelTicks, WifiScan, seconds
 from sensors.simulation.robot import SimulatedRobot
@@ -100,14 +100,14 @@ class SimulatedSensor:
         self._is_open = True
         return DeviceInfo(f"simulated {self.kind.__name__}", settings=self._about)
 
-    def poll(self, timeout_s: float) -> Sequence[Said]:
+    def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
         """What fell due, waiting for the first of it."""
         if not self._is_open or not self._is_there():
             raise DeviceLostError(f"{self._name}: the simulated device is gone", "plug it in")
         clock = self._robot.clock
         if self.kind in self._robot.garbled:
             self._robot.garbled.remove(self.kind)
-            return [Remark(clock.now_ns(), self._name, Level.WARN, "a reading that cannot be understood")]
+            return [Diagnostic(clock.now_ns(), self._name, Level.WARN, "a reading that cannot be understood")]
         if self._at == len(self._script):
             raise DeviceLostError(f"{self._name}: the simulated drive is over", "stop, or drive a longer scenario")
         clock.sleep(min(seconds(self._script[self._at].time_ns - self._robot.elapsed_ns()), timeout_s))
@@ -121,7 +121,7 @@ class SimulatedSensor:
         elapsed_ns = self._robot.elapsed_ns()
         return self.kind not in self._robot.unplugged and not any(f.unplugs(elapsed_ns) for f in self._faults)
 
-    def _due(self) -> Iterator[Said]:
+    def _due(self) -> Iterator[DriverOutput]:
         """What fell due since the last poll, as the faults leave it."""
         now_ns = self._robot.elapsed_ns()
         while self._at < len(self._script) and self._script[self._at].time_ns <= now_ns:
@@ -132,7 +132,7 @@ class SimulatedSensor:
             if said is not None:
                 yield self._signed(said)
 
-    def _signed(self, said: Measurement | Truth) -> Said:
+    def _signed(self, said: Measurement | Truth) -> DriverOutput:
         time_ns = max(said.time_ns + self._robot.start_ns, 0)  # no clock that counts from boot shows less
         if isinstance(said, Truth):
             return said._replace(time_ns=time_ns)
@@ -157,7 +157,7 @@ class SimulatedMotors(SimulatedSensor):
         self._standing = before if isinstance(before, MotorCommand) else None
         return info
 
-    def poll(self, timeout_s: float) -> Sequence[Said]:
+    def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
         """What fell due."""
         if self._standing is None:
             return super().poll(timeout_s)

@@ -4,7 +4,7 @@
     R,0x1a,3.417,0.05     and its standard deviation [m]
     R,0x1a,3.417;0x2b,5.02,0.1    several anchors at one time
     F,0x1a,timeout        a ranging that failed, and why
-    # anything            is kept as a remark
+    # anything            is kept as a diagnostic
 
 A line is one message, stamped at its first byte. Anchors go by any name without comma, semicolon or blank.
 """

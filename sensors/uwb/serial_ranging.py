@@ -1,7 +1,7 @@
 """What UWB modules on a serial port have in common: a port, lines, ranges with the names of anchors.
 
 A reading that cannot be understood costs that reading, a line that cannot be understood that line; both are told, and
-counted. The device's own position and its failures are remarks: no estimator sees them, the log keeps them.
+counted. The device's own position and its failures are diagnostics: no estimator sees them, the log keeps them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import ClassVar, NamedTuple
 
-from fusion import Clock, DeviceInfo, DriverSpec, Found, Level, RangeReading, Ranges, Remark, Said, SettingError
+from fusion import (
+    Clock,
+    DeviceInfo,
+    Diagnostic,
+    DriverOutput,
+    DriverSpec,
+    Found,
+    Level,
+    RangeReading,
+    Ranges,
+    SettingError,
+)
 from sensors.uwb.serial_port import NEEDS, Line, LineReader, SerialPort, find_ports
 
 LONGEST_RANGE_M = 1000.0
@@ -97,12 +108,12 @@ class SerialRanging:
         settings = {"port": self._port.path, "baudrate": self._port.baudrate}
         return DeviceInfo(self.model, firmware=firmware, settings=settings)
 
-    def poll(self, timeout_s: float) -> Sequence[Said]:
+    def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
         """What came."""
         said = [one for line in self._lines.feed(self._port.read(timeout_s)) for one in self._said(line)]
         if self._lines.overlong > self._overlong:
             self._overlong = self._lines.overlong
-            said.append(self._remark(self._clock.now_ns(), "a line without an end was dropped"))
+            said.append(self._diagnostic(self._clock.now_ns(), "a line without an end was dropped"))
         return said
 
     def close(self) -> None:
@@ -119,7 +130,7 @@ class SerialRanging:
         """What a line says, and when that was true [ns]."""
         raise NotImplementedError
 
-    def _said(self, line: Line) -> Iterator[Said]:
+    def _said(self, line: Line) -> Iterator[DriverOutput]:
         for time_ns, heard in self._hear(line):
             if heard.ranges:
                 self._seq += 1
@@ -129,9 +140,9 @@ class SerialRanging:
                 )
                 yield Ranges(time_ns, self._name, self._seq, readings)
             if heard.values:
-                yield Remark(time_ns, self._name, Level.OK, "told beside the ranges", heard.values)
+                yield Diagnostic(time_ns, self._name, Level.OK, "told beside the ranges", heard.values)
             if heard.refused:
-                yield self._remark(time_ns, f"{heard.refused} readings cannot be understood", line.text)
+                yield self._diagnostic(time_ns, f"{heard.refused} readings cannot be understood", line.text)
 
-    def _remark(self, time_ns: int, text: str, line: str = "") -> Remark:
-        return Remark(time_ns, self._name, Level.WARN, text, (("line", line[:200]),) if line else ())
+    def _diagnostic(self, time_ns: int, text: str, line: str = "") -> Diagnostic:
+        return Diagnostic(time_ns, self._name, Level.WARN, text, (("line", line[:200]),) if line else ())

@@ -19,12 +19,12 @@ from fusion import (
     Clock,
     DeviceInfo,
     DeviceLostError,
+    Diagnostic,
+    DriverOutput,
     DriverSpec,
     Found,
     Level,
     Needs,
-    Remark,
-    Said,
     SettingError,
 )
 from fusion.values import WheelTicks, nanoseconds, seconds
@@ -95,7 +95,7 @@ class Encoders:
         settings = {"chip": self._chip, "lines": self._lines, "hz": self._hz, "debounce_s": self._debounce_s}
         return DeviceInfo(self._device.model, settings=settings)
 
-    def poll(self, timeout_s: float) -> Sequence[Said]:
+    def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
         """Count edges until the next report is due."""
         if not self._is_open:
             raise DeviceLostError(f"{self._name} is not open", "open the driver first")
@@ -126,7 +126,7 @@ class Encoders:
             self._unseen += edge.number - self._number[edge.line] - 1
             self._number[edge.line] = edge.number
 
-    def _report(self, now_ns: int) -> Iterator[Said]:
+    def _report(self, now_ns: int) -> Iterator[DriverOutput]:
         """The counts, true a debouncing time ago: an edge since then may not have been told yet.
 
         Reports fall due at whole periods. One that is held up puts off the next, so that none follows within half a
@@ -136,7 +136,7 @@ class Encoders:
         counts = tuple(self._before[line] + self._number[line] for line in self._lines)
         if self._unseen:
             text = f"{self._unseen} edges were counted and not seen one by one: this program was held up"
-            yield Remark(now_ns, self._name, Level.WARN, text, (("edges", str(self._unseen)),))
+            yield Diagnostic(now_ns, self._name, Level.WARN, text, (("edges", str(self._unseen)),))
             self._unseen = 0
         self._seq += 1
         yield WheelTicks(max(now_ns - nanoseconds(self._debounce_s), self._opened_ns), self._name, self._seq, counts)

@@ -22,7 +22,18 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar
 
-from fusion import BootClock, Clock, DeviceInfo, DeviceLostError, DriverError, DriverSpec, Found, Level, Remark, Said
+from fusion import (
+    BootClock,
+    Clock,
+    DeviceInfo,
+    DeviceLostError,
+    Diagnostic,
+    DriverError,
+    DriverOutput,
+    DriverSpec,
+    Found,
+    Level,
+)
 from fusion.values import MotorCommand
 from sensors.device_errors import device_error
 
@@ -85,7 +96,7 @@ class Motors:
         self._socket = made
         return DeviceInfo("motor commands", settings={"path": str(self._path)})
 
-    def poll(self, timeout_s: float) -> Sequence[Said]:
+    def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
         """The next command."""
         if self._socket is None or not self._path.exists():
             raise DeviceLostError(f"{self._name}: the socket {self._path} is gone", "it is made again by itself")
@@ -95,7 +106,7 @@ class Motors:
         speeds = parse(datagram)
         if speeds is None:
             text = "a command that cannot be understood"
-            return [Remark(now_ns, self._name, Level.WARN, text, (("datagram", repr(datagram[:100])),))]
+            return [Diagnostic(now_ns, self._name, Level.WARN, text, (("datagram", repr(datagram[:100])),))]
         self._seq += 1
         return [MotorCommand(now_ns, self._name, self._seq, speeds)]
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import ClassVar, Generic
 
-from fusion.driver import Clock, DeviceInfo, Level, Remark, Said
+from fusion.driver import Clock, DeviceInfo, Diagnostic, DriverOutput, Level
 from fusion.errors import DeviceLostError, DriverError
 from sensors.wifi.errors import lost, refused, require_pyroute2
 from sensors.wifi.interface import Interface, look_up, require_there
@@ -47,7 +47,7 @@ class WifiDriver(ABC, Generic[Result]):
         model = f"{interface.driver or 'Wi-Fi radio'} on phy{interface.wiphy}"
         return DeviceInfo(model, serial=interface.mac, settings=MappingProxyType(dict(settings)))
 
-    def poll(self, timeout_s: float) -> Sequence[Said]:
+    def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
         """What came of a scan or a round, or what went wrong, or nothing yet."""
         if self._loop is None or self._interface is None:
             raise DeviceLostError(f"{self._name} is not open", "open it")
@@ -62,7 +62,7 @@ class WifiDriver(ABC, Generic[Result]):
         if outcome is None:
             return []
         if isinstance(outcome, Trouble):
-            return [Remark(self._clock.now_ns(), self._name, Level.WARN, outcome.text)]
+            return [Diagnostic(self._clock.now_ns(), self._name, Level.WARN, outcome.text)]
         return self._told(outcome)
 
     def close(self) -> None:
@@ -79,5 +79,5 @@ class WifiDriver(ABC, Generic[Result]):
         """The settings in force, for the log."""
 
     @abstractmethod
-    def _told(self, result: Result) -> list[Said]:
+    def _told(self, result: Result) -> list[DriverOutput]:
         """What a result comes to."""

@@ -1,6 +1,6 @@
-"""What a scan comes to: a `WifiScan`, and a remark that says how it came about.
+"""What a scan comes to: a `WifiScan`, and a diagnostic that says how it came about.
 
-The remark has what the measurement has no room for: the scan's number, mode and channels, its window, how it was
+The diagnostic has what the measurement has no room for: the scan's number, mode and channels, its window, how it was
 stamped and how well, and the networks' names.
 """
 
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fusion.driver import Level, Remark, Said
+from fusion.driver import Diagnostic, DriverOutput, Level
 from fusion.values import RssiReading, WifiScan, seconds
 from sensors.wifi.reading import Stamp, Stamped, betrays_end_stamping, stamped
 from sensors.wifi.scanner import Scan
@@ -31,14 +31,14 @@ class Report:
         at_end = driver in END_STAMPING if self._settings.stamp == "auto" else self._settings.stamp == "scan_end"
         self.stamp = Stamp.SCAN_END if at_end else Stamp.FRAME
 
-    def tell(self, scan: Scan, *, listens: bool) -> list[Said]:
-        """A measurement if anything was heard, and always the remark."""
+    def tell(self, scan: Scan, *, listens: bool) -> list[DriverOutput]:
+        """A measurement if anything was heard, and always the diagnostic."""
         if self._settings.stamp == "auto" and any(map(betrays_end_stamping, scan.parts)):
             self.stamp = Stamp.SCAN_END  # caught once, it always does
         readings = self._kept([one for part in scan.parts for one in stamped(part, self.stamp)])
-        remark = self._remark(scan, readings, "listen" if listens else self._settings.mode)
+        diagnostic = self._diagnostic(scan, readings, "listen" if listens else self._settings.mode)
         self._scans += 1
-        return [*self._measurement(readings), remark]
+        return [*self._measurement(readings), diagnostic]
 
     def _kept(self, readings: Sequence[Stamped]) -> list[Stamped]:
         """Newest last."""
@@ -58,7 +58,7 @@ class Report:
     def _anchor(self, reading: Stamped) -> str:
         return self._settings.names.get(reading.heard.bssid, reading.heard.bssid)
 
-    def _remark(self, scan: Scan, readings: Sequence[Stamped], mode: str) -> Remark:
+    def _diagnostic(self, scan: Scan, readings: Sequence[Stamped], mode: str) -> Diagnostic:
         windows = [part.window for part in scan.parts]
         networks = (f"{self._anchor(one)}={one.heard.ssid}@{one.heard.frequency_mhz}" for one in readings)
         values: dict[str, object] = {
@@ -74,4 +74,4 @@ class Report:
             "heard": " ".join(networks),
         }
         told = tuple((key, str(value)) for key, value in values.items())
-        return Remark(windows[-1].done_ns, self._name, Level.OK, f"heard {len(readings)} access points", told)
+        return Diagnostic(windows[-1].done_ns, self._name, Level.OK, f"heard {len(readings)} access points", told)

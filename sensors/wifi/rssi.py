@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import MappingProxyType
 
-from fusion.driver import Clock, DriverSpec, FakeDevice, Found, Needs, Said
+from fusion.driver import Clock, DriverOutput, DriverSpec, FakeDevice, Found, Needs
 from fusion.errors import SettingError
 from fusion.values import WifiScan, nanoseconds
 from sensors.wifi.discovery import discover
@@ -101,7 +101,7 @@ class Wifi(WifiDriver[Scan]):
             "power_save": power_save(nl80211, interface),
         }
 
-    def _told(self, result: Scan) -> list[Said]:
+    def _told(self, result: Scan) -> list[DriverOutput]:
         return self._report.tell(result, listens=self._listens())
 
 

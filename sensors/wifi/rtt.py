@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
-from fusion.driver import Clock, DriverSpec, FakeDevice, Found, Level, Needs, Remark, Said
+from fusion.driver import Clock, Diagnostic, DriverOutput, DriverSpec, FakeDevice, Found, Level, Needs
 from fusion.errors import SettingError, UnsupportedError
 from fusion.values import RangeReading, Ranges
 from sensors.wifi.discovery import discover_ranging
@@ -83,7 +83,7 @@ class WifiRtt(WifiDriver[Round]):
         peers = {peer.anchor: f"{peer.bssid} {peer.frequency_mhz} MHz" for peer in self._settings.peers}
         return {"interface": interface.name, "peers": peers, "offers": dict(interface.ftm or {})}
 
-    def _told(self, result: Round) -> list[Said]:
+    def _told(self, result: Round) -> list[DriverOutput]:
         """The ranges that were measured, and how each attempt ended."""
         attempts = [one for one in result.attempts if one.bssid in self._anchors]
         readings = [
@@ -92,17 +92,17 @@ class WifiRtt(WifiDriver[Round]):
             if one.status is Status.SUCCESS and one.range_m is not None
         ]
         self._rounds += 1
-        remark = self._remark(attempts, len(readings), result.done_ns)
+        diagnostic = self._diagnostic(attempts, len(readings), result.done_ns)
         if not readings:
-            return [remark]
+            return [diagnostic]
         told_ns = (one.time_ns for one in attempts if one.time_ns is not None and one.time_ns <= result.done_ns)
         self._seq += 1
-        return [Ranges(max(told_ns, default=result.done_ns), self._name, self._seq - 1, tuple(readings)), remark]
+        return [Ranges(max(told_ns, default=result.done_ns), self._name, self._seq - 1, tuple(readings)), diagnostic]
 
-    def _remark(self, attempts: list[Attempt], measured: int, done_ns: int) -> Remark:
+    def _diagnostic(self, attempts: list[Attempt], measured: int, done_ns: int) -> Diagnostic:
         values = [("round", str(self._rounds - 1)), *((self._anchors[one.bssid], _in_words(one)) for one in attempts)]
         level = Level.OK if measured == len(attempts) == len(self._anchors) else Level.WARN
-        return Remark(done_ns, self._name, level, f"{measured} of {len(self._anchors)} ranges", tuple(values))
+        return Diagnostic(done_ns, self._name, level, f"{measured} of {len(self._anchors)} ranges", tuple(values))
 
 
 def _in_words(attempt: Attempt) -> str:

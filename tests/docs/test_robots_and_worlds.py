@@ -13,7 +13,7 @@ from benchmarks.review.folding import Reviewed
 from benchmarks.runner.adhoc_suite import bench
 from benchmarks.runner.estimator_run import run_estimator
 from fusion import Truth, World
-from fusion.driver import Remark
+from fusion.driver import Diagnostic
 from fusion.plugins import SENSORS
 from logs.reader import read_run
 from sensors.cli import doctor
@@ -149,7 +149,7 @@ def measured(driver):
     """The first measurement of a driver."""
     for _ in range(100):
         for said in driver.poll(0.05):
-            if not isinstance(said, Remark | Truth):
+            if not isinstance(said, Diagnostic | Truth):
                 return said
     return None
 

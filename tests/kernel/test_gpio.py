@@ -39,11 +39,14 @@ def test_the_encoders_driver_keeps_distance_through_everything_and_says_what_hap
     seen = run_job("encoders_driver", pulses=PULSES, unread=UNREAD).answer
     (chip,) = seen["found"]
     assert seen["opened"] == {"chip": chip, "lines": [0, 1, 2, 3], "hz": 20.0, "debounce_s": 0.0}
-    assert seen["at rest"] == {"counts": [0, 0, 0, 0], "remarks": []}
-    assert seen["turned"] == {"counts": PULSES, "remarks": []}
+    assert seen["at rest"] == {"counts": [0, 0, 0, 0], "diagnostics": []}
+    assert seen["turned"] == {"counts": PULSES, "diagnostics": []}
     assert seen["held up"]["counts"] == [PULSES[0] + UNREAD, *PULSES[1:]]
-    assert [remark["edges"] for remark in seen["held up"]["remarks"]] == [str(UNREAD - BUFFER)]
-    assert seen["plugged again"] == {"counts": [2 * PULSES[0] + UNREAD, *(2 * n for n in PULSES[1:])], "remarks": []}
+    assert [diagnostic["edges"] for diagnostic in seen["held up"]["diagnostics"]] == [str(UNREAD - BUFFER)]
+    assert seen["plugged again"] == {
+        "counts": [2 * PULSES[0] + UNREAD, *(2 * n for n in PULSES[1:])],
+        "diagnostics": [],
+    }
     for what, kind in REFUSALS.items():
         assert seen[what][0] == kind, what
     assert "gpioinfo" in seen["second owner"][1]

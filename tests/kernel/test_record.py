@@ -69,7 +69,11 @@ def test_every_real_driver_is_in_the_recording_and_no_tick_is_lost(driven):
     assert len(heard[Gyro]) > 400
     assert {one.anchor for scan in heard[WifiScan] for one in scan.readings} == {"ap1", "ap2", "ap3"}
     assert [m.wheel_speeds_m_s[0] > 0.0 for m in run.measurements if isinstance(m, MotorCommand)].count(True) >= 4
-    models = {remark.sensor: dict(remark.values)["model"] for remark in run.remarks if remark.text == "opened"}
+    models = {
+        diagnostic.sensor: dict(diagnostic.values)["model"]
+        for diagnostic in run.diagnostics
+        if diagnostic.text == "opened"
+    }
     assert models["gyro"] == "MPU-6050"
 
 

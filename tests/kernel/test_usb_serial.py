@@ -31,8 +31,8 @@ def test_the_uwb_drivers_are_lost_once_and_back_once_over_a_cable_pulled_out(run
     for name, one in heard.items():
         told = seen[name]
         assert told["ranges"] == [one] * 10, name
-        assert [level for level, _ in told["remarks"]] == ["WARN", "OK"], name
-        assert "/dev/ttyACM0 went away" in told["remarks"][0][1]
-        assert told["remarks"][1][1] == "uwb is back"
+        assert [level for level, _ in told["diagnostics"]] == ["WARN", "OK"], name
+        assert "/dev/ttyACM0 went away" in told["diagnostics"][0][1]
+        assert told["diagnostics"][1][1] == "uwb is back"
         assert told["losses"] == 1
         assert told["found"] == ["/dev/ttyACM0"]

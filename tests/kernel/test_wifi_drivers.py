@@ -107,11 +107,11 @@ def test_ranges_are_the_true_distances_and_a_silent_peer_is_told(run_job):
     true_m = [(1.414, 5.099, 4.472), (5.099, 1.414, 4.472), (5.0, 5.0, 1.0)]
     for one, metres in zip(ranges["rounds"], true_m, strict=True):
         assert one["ranges"] == [[f"ap{k}", m, None] for k, m in enumerate(metres, 1)]
-        assert [remark[:2] for remark in one["remarks"]] == [["OK", "3 of 3 ranges"]]
+        assert [diagnostic[:2] for diagnostic in one["diagnostics"]] == [["OK", "3 of 3 ranges"]]
     silent = ranges["ap3 silent"]
     assert silent["ranges"] == [["ap1", 5.0, None], ["ap2", 5.0, None]]
-    assert silent["remarks"][0][0] == "WARN"
-    assert ["ap3", "timeout"] in silent["remarks"][0]
+    assert silent["diagnostics"][0][0] == "WARN"
+    assert ["ap3", "timeout"] in silent["diagnostics"][0]
     assert "wifi_rtt:02:00:00:00:00:00" in ranges["found"]
     assert ranges["down"][:2] == ["NotFoundError", "wlan0 is down"]
     assert ranges["plain radio"][0] == "UnsupportedError"

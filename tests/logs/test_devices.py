@@ -1,6 +1,6 @@
 """What a recording tells of its computer and its devices."""
 
-from fusion import Level, Remark
+from fusion import Diagnostic, Level
 from logs.device_messages import ClockSync
 from logs.devices import complaints, devices, dropped, wall_clock
 
@@ -32,17 +32,17 @@ def test_a_suspended_computer_is_told():
 
 def test_devices_complaints_and_drops_are_counted():
     def status(count):
-        return Remark(3, "gyro", Level.WARN, "status", (("dropped", str(count)),))
+        return Diagnostic(3, "gyro", Level.WARN, "status", (("dropped", str(count)),))
 
-    remarks = [
-        Remark(1, "gyro", Level.OK, "opened", (("model", "MPU-6050"),)),
-        Remark(2, "gyro", Level.WARN, "gone"),
-        Remark(3, "gyro", Level.WARN, "gyro: gone"),
-        Remark(4, "gyro", Level.OK, "back"),
+    diagnostics = [
+        Diagnostic(1, "gyro", Level.OK, "opened", (("model", "MPU-6050"),)),
+        Diagnostic(2, "gyro", Level.WARN, "gone"),
+        Diagnostic(3, "gyro", Level.WARN, "gyro: gone"),
+        Diagnostic(4, "gyro", Level.OK, "back"),
         status(0),
         status(7),
-        Remark(5, "wifi", Level.OK, "status", (("dropped", "0"),)),
+        Diagnostic(5, "wifi", Level.OK, "status", (("dropped", "0"),)),
     ]
-    assert devices(remarks) == {"gyro": {"model": "MPU-6050"}}
-    assert complaints(remarks) == [("gyro: gone", 2)]
-    assert dropped(remarks) == {"gyro": 7}
+    assert devices(diagnostics) == {"gyro": {"model": "MPU-6050"}}
+    assert complaints(diagnostics) == [("gyro: gone", 2)]
+    assert dropped(diagnostics) == {"gyro": 7}

@@ -6,7 +6,7 @@ import json
 import pytest
 
 from benchmarks.runner.adhoc_suite import bench, remarks
-from fusion import Level, MotorCommand, Odometry, Remark, Truth, WheelTicks, World
+from fusion import Diagnostic, Level, MotorCommand, Odometry, Truth, WheelTicks, World
 from fusion.cli.main import main
 from logs.cli.import_ import import_recordings
 from logs.reader import read_run
@@ -42,7 +42,7 @@ def command(time_s, *speeds, seq=0):
 
 
 def lost(time_s, state="backoff"):
-    return Remark(round(time_s * SECOND), "motors", Level.WARN, "motors: the socket is gone", (("state", state),))
+    return Diagnostic(round(time_s * SECOND), "motors", Level.WARN, "motors: the socket is gone", (("state", state),))
 
 
 def missed(measurements, remarks=()):
@@ -121,8 +121,8 @@ def log(tmp_path):
     def write(*said, about=None, encoder="single_channel"):
         with RunWriter(tmp_path / "run.mcap", world(encoder), name="run", metadata=about or {}) as writer:
             for one in said:
-                if isinstance(one, Remark):
-                    writer.write_remark(one)
+                if isinstance(one, Diagnostic):
+                    writer.write_diagnostic(one)
                 else:
                     writer.write(one)
             for k in range(21):

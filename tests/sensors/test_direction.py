@@ -143,7 +143,7 @@ def test_the_commands_warn_once_while_they_run_and_at_the_end(tmp_path, capsys):
 
 
 def test_a_driver_that_its_device_holds_up_states_no_direction(robot):
-    """It remarks nothing, for it does not come back; its status shows it."""
+    """It reports nothing, for it does not come back; its status shows it."""
     sensing = Sensing(robot())
     said = [MotorCommand(0, "motors", 0, (0.6,) * 4), *(WheelTicks(k, "encoders", k, (20 * k,) * 4) for k in range(3))]
     sensing._supervisor.take = lambda _: [Received(one.time_ns, one) for one in said]

@@ -11,8 +11,8 @@ from fusion import (
     BootClock,
     BusyError,
     DeviceLostError,
+    Diagnostic,
     NotPermittedError,
-    Remark,
     SettingError,
     VirtualClock,
     WheelTicks,
@@ -63,9 +63,9 @@ def test_edges_that_nobody_read_count_all_the_same_and_are_told(wheels):
     driver, device = wheels
     report(driver)
     device.turn(1550)
-    remark, ticks = report(driver)
+    diagnostic, ticks = report(driver)
     assert ticks.counts == (1550, 1550)
-    assert dict(remark.values)["edges"] == str(2 * 1550 - BUFFER)
+    assert dict(diagnostic.values)["edges"] == str(2 * 1550 - BUFFER)
 
 
 def test_a_line_that_chatters_without_end_does_not_hold_up_the_report(wheels, monkeypatch):
@@ -173,7 +173,7 @@ def test_settings_that_cannot_be_are_refused(settings):
         Encoders("wheels", BootClock(), **{"lines": (17, 27), **settings})
 
 
-def test_a_remark_is_no_measurement(wheels):
+def test_a_diagnostic_is_no_measurement(wheels):
     driver, device = wheels
     device.garble()
-    assert any(isinstance(one, Remark) for one in report(driver))
+    assert any(isinstance(one, Diagnostic) for one in report(driver))

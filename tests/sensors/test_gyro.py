@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from fusion import (
     BusyError,
     DeviceLostError,
+    Diagnostic,
     Gyro,
     NotFoundError,
     NotPermittedError,
     ProtocolError,
-    Remark,
     SettingError,
     VirtualClock,
     WheelTicks,
@@ -75,7 +75,7 @@ def test_samples_fall_due_at_whole_periods_and_missed_ones_are_told():
     assert late.time_ns == 1_080_000_000
     assert after.time_ns == 1_100_000_000
     clock.sleep(10.0)
-    said = [one for _ in range(3) for one in driver.poll(0.1) if isinstance(one, Remark)]
+    said = [one for _ in range(3) for one in driver.poll(0.1) if isinstance(one, Diagnostic)]
     assert int(dict(said[0].values)["samples missed"]) == pytest.approx(550, abs=3)
     assert dict(said[0].values)["temperature_c"] == "36.53"
 
@@ -135,9 +135,9 @@ def test_the_kernels_gyro_is_found_by_name_and_told_in_its_own_scale(tmp_path):
     info = driver.open()
     assert (info.model, info.settings["scale"]) == ("mpu6050", 0.001)
     assert (tmp_path / "iio:device0" / "current_timestamp_clock").read_text() == "monotonic"
-    rate, remark = driver.poll(0.1)
+    rate, diagnostic = driver.poll(0.1)
     assert rate.rate_rad_s == pytest.approx(0.01)
-    assert dict(remark.values)["temperature_c"] == "39.47"
+    assert dict(diagnostic.values)["temperature_c"] == "39.47"
     with pytest.raises(NotFoundError, match=r"no gyro 'mpu' .*mpu6050 \(iio:device0\)"):
         GyroIio("gyro", VirtualClock(), **device.settings, device="mpu").open()
 
@@ -146,7 +146,7 @@ def test_the_kernels_gyro_is_found_by_name_and_told_in_its_own_scale(tmp_path):
 
 
 def stand(rates, *, moving=(), sensor="gyro"):
-    """Remarks on ticks every half second and ten rates between; ``moving``: seconds in which the wheels count."""
+    """Diagnostics on ticks every half second and ten rates between; ``moving``: seconds in which the wheels count."""
     watch, told, count = Standstill(), [], 0
     for half in range(len(rates) // 10):
         for i, rate in enumerate(rates[10 * half : 10 * half + 10]):
@@ -157,9 +157,9 @@ def stand(rates, *, moving=(), sensor="gyro"):
 
 
 def test_five_seconds_of_standing_tell_the_bias():
-    remark, *_ = stand([0.004 + (0.001 if i % 2 else -0.001) for i in range(240)])
-    values = {key: float(value) for key, value in remark.values}
-    assert (remark.sensor, remark.text) == ("gyro", "bias at standstill")
+    diagnostic, *_ = stand([0.004 + (0.001 if i % 2 else -0.001) for i in range(240)])
+    values = {key: float(value) for key, value in diagnostic.values}
+    assert (diagnostic.sensor, diagnostic.text) == ("gyro", "bias at standstill")
     assert values["bias_rad_s"] == pytest.approx(0.004)
     assert values["bias_std_rad_s"] == pytest.approx(0.001 / math.sqrt(values["samples"]), rel=0.02)
 
@@ -170,6 +170,6 @@ def test_moving_or_shaken_robots_tell_none():
 
 
 def test_a_hand_that_turns_the_standing_robot_is_no_bias():
-    told = [remark.text for remark in stand([0.004] * 130 + [0.1] * 230)]
+    told = [diagnostic.text for diagnostic in stand([0.004] * 130 + [0.1] * 230)]
     assert told[0] == "bias at standstill"
     assert "turned while the wheels stood" in told

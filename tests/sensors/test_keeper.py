@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from fusion.driver import DeviceInfo, DriverSpec, Level, Remark, VirtualClock
+from fusion.driver import DeviceInfo, Diagnostic, DriverSpec, Level, VirtualClock
 from fusion.errors import BusyError, DeviceLostError, NotFoundError, NotPermittedError
 from fusion.values import Gyro, nanoseconds
 from sensors.onboard.driver_lifecycle import LONGEST_WAIT_S, Keeper, State
@@ -51,8 +51,8 @@ def run(keeper, turns):
     return [one for _ in range(turns) for one in keeper.turn(0.1)]
 
 
-def remarks(received):
-    return [one.said for one in received if isinstance(one.said, Remark)]
+def diagnostics(received):
+    return [one.said for one in received if isinstance(one.said, Diagnostic)]
 
 
 def test_what_a_driver_says_comes_out_with_its_time_of_arrival():
@@ -66,8 +66,8 @@ def test_what_a_driver_says_comes_out_with_its_time_of_arrival():
 def test_a_device_that_is_missing_at_the_start_is_waited_for_and_told_once_each_way():
     gone = NotFoundError("no device", "plug it in")
     keeper, driver, _ = kept([1, 1], [gone] * 5 + [None])
-    said = remarks(run(keeper, 400))
-    assert [remark.level for remark in said] == [Level.WARN, Level.OK, Level.WARN]  # away, back, silent
+    said = diagnostics(run(keeper, 400))
+    assert [diagnostic.level for diagnostic in said] == [Level.WARN, Level.OK, Level.WARN]  # away, back, silent
     assert driver.opened >= 6
     assert keeper.losses == 2
 
@@ -105,22 +105,22 @@ def test_a_device_that_was_healthy_for_long_is_tried_again_at_once():
 
 def test_silence_counts_as_loss_only_where_it_is_too_long():
     slow, _, clock = kept([1, *[0] * 55, 1], least_hz=0.5)
-    assert not remarks(run(slow, 58))
+    assert not diagnostics(run(slow, 58))
     assert clock.now_ns() > nanoseconds(5.5)
     silent, driver, _ = kept([1], least_hz=10.0)
-    said = remarks(run(silent, 14))
+    said = diagnostics(run(silent, 14))
     assert "said nothing" in said[0].text
     assert driver.closed == 1
 
 
 def test_a_sensor_that_speaks_only_when_something_happens_may_be_silent_for_ever():
     keeper, _, _ = kept((), least_hz=0.0)
-    assert not remarks(run(keeper, 1000))
+    assert not diagnostics(run(keeper, 1000))
 
 
 def test_what_needs_a_person_is_not_tried_again():
     keeper, driver, _ = kept((), [NotPermittedError("may not", "join the group i2c")])
-    said = remarks(run(keeper, 100))
+    said = diagnostics(run(keeper, 100))
     assert driver.opened == 1
     assert keeper.state is State.FAILED
     assert "i2c" in said[0].text
@@ -135,7 +135,7 @@ def test_failing_fast_ends_at_the_first_loss():
 
 def test_a_fault_of_a_driver_is_told_as_its_own_and_costs_only_itself():
     keeper, driver, _ = kept([ZeroDivisionError("oops"), 1])
-    said = remarks(run(keeper, 20))
+    said = diagnostics(run(keeper, 20))
     assert "ZeroDivisionError" in said[0].text
     assert driver.opened == 2
 

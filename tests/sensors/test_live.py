@@ -129,7 +129,7 @@ def test_a_replay_of_the_log_says_what_was_said_live_to_the_bit(robot, tmp_path,
     run = read_run(log)
     assert json.loads(run.metadata["live_lanes"])["ekf"] == {"parameters": options, "seed": 3}
     assert len(run.lanes["ekf"]) >= len(run.measurements) > 100
-    assert [remark for remark in run.remarks if remark.text == "status"]
+    assert [diagnostic for diagnostic in run.diagnostics if diagnostic.text == "status"]
     assert len(told) >= 10
     assert told[-1].measurements >= 100
 
@@ -210,9 +210,9 @@ def test_an_estimator_that_fails_ends_its_own_lane_and_is_told_once(robot, tmp_p
     assert set(ended.digests) == {"ekf"}
     log = ended.paths[0]
     run = read_run(log)
-    assert [(remark.sensor, remark.level) for remark in run.remarks if remark.text == ended.trouble] == [
-        (name, Level.ERROR)
-    ]
+    assert [
+        (diagnostic.sensor, diagnostic.level) for diagnostic in run.diagnostics if diagnostic.text == ended.trouble
+    ] == [(name, Level.ERROR)]
     assert run.measurements[-1].time_ns - run.prior.time_ns > 1.4e9
     assert replay(log, "ekf", verify=log) == ended.digests["ekf"]
     assert record(told[-1])["valid"] is False

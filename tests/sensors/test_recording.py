@@ -42,9 +42,15 @@ def test_everything_the_sensors_said_is_in_the_log(robot, tmp_path):
 
 def test_the_log_tells_of_devices_clocks_and_how_sensors_do(robot, tmp_path):
     run = read_run(recorded(robot(), tmp_path / "out", 1.5).paths[0])
-    opened = {remark.sensor: dict(remark.values) for remark in run.remarks if remark.text == "opened"}
+    opened = {
+        diagnostic.sensor: dict(diagnostic.values) for diagnostic in run.diagnostics if diagnostic.text == "opened"
+    }
     assert json.loads(opened["gyro"]["settings"])["scenario"] == "room"
-    status = [dict(remark.values) for remark in run.remarks if remark.text == "status" and remark.sensor == "gyro"]
+    status = [
+        dict(diagnostic.values)
+        for diagnostic in run.diagnostics
+        if diagnostic.text == "status" and diagnostic.sensor == "gyro"
+    ]
     assert [row["state"] for row in status] == ["running"] * len(status)
     assert len(status) >= 2
     assert abs(run.clocks[0].real_ns - time.time_ns()) < 600e9
@@ -59,14 +65,14 @@ def test_splits_are_whole_logs_and_become_one_again(robot, tmp_path):
     assert all("`fusion join`" in warning for part in parts for warning in part.warnings)
     assert len({part.world.hash for part in parts}) == 1
     assert all(part.clocks for part in parts)
-    assert all({r.sensor for r in part.remarks if r.text == "opened"} >= {"gyro", "wifi"} for part in parts)
+    assert all({r.sensor for r in part.diagnostics if r.text == "opened"} >= {"gyro", "wifi"} for part in parts)
     assert [part.prior is not None for part in parts] == [True] + [False] * (len(parts) - 1)
     assert join([tmp_path / "out"], tmp_path / "whole.mcap") == ()
     whole = read_run(tmp_path / "whole.mcap")
     assert list(whole.measurements) == [m for part in parts for m in part.measurements]
     assert whole.prior == parts[0].prior
     assert not whole.warnings
-    assert len(whole.remarks) == sum(len(part.remarks) for part in parts)
+    assert len(whole.diagnostics) == sum(len(part.diagnostics) for part in parts)
 
 
 def test_joining_names_what_is_missing_and_refuses_what_does_not_belong(robot, tmp_path):
@@ -91,8 +97,10 @@ def test_joining_names_what_is_missing_and_refuses_what_does_not_belong(robot, t
 def test_a_sensor_that_is_unplugged_costs_itself_alone(robot, tmp_path):
     faults = {"wifi": '{ kind = "unplug", from_s = 0.6, to_s = 1.4 }'}
     run = read_run(recorded(robot(faults=faults), tmp_path / "out", 3.0).paths[0])
-    told = [remark for remark in run.remarks if remark.sensor == "wifi" and "unplugged" in remark.text]
-    told += [remark for remark in run.remarks if remark.sensor == "wifi" and "gone" in remark.text]
+    told = [
+        diagnostic for diagnostic in run.diagnostics if diagnostic.sensor == "wifi" and "unplugged" in diagnostic.text
+    ]
+    told += [diagnostic for diagnostic in run.diagnostics if diagnostic.sensor == "wifi" and "gone" in diagnostic.text]
     assert told
     gyro = [m.time_ns for m in run.measurements if isinstance(m, Gyro)]
     assert max(b - a for a, b in pairwise(gyro)) < 0.5e9

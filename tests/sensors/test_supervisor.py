@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from fusion.driver import BootClock, DeviceInfo, DriverSpec, Level, Remark, VirtualClock
+from fusion.driver import BootClock, DeviceInfo, Diagnostic, DriverSpec, Level, VirtualClock
 from fusion.errors import DeviceLostError, NotFoundError
 from fusion.values import Gyro
 from sensors.onboard.driver_lifecycle import Keeper, Received, State
@@ -83,9 +83,9 @@ def test_a_full_queue_drops_its_oldest_and_counts():
     assert box.take() == []
 
 
-def test_remarks_are_no_measurements():
+def test_diagnostics_are_no_measurements():
     box = Mailbox()
-    box.put([Received(1, Remark(1, "g", Level.WARN, "gone"))])
+    box.put([Received(1, Diagnostic(1, "g", Level.WARN, "gone"))])
     assert (box.messages, box.latest) == (0, None)
 
 

@@ -11,13 +11,13 @@ from fusion import (
     BootClock,
     BusyError,
     DeviceLostError,
+    Diagnostic,
     Level,
     NotFoundError,
     NotPermittedError,
     ProtocolError,
     RangeReading,
     Ranges,
-    Remark,
     SettingError,
     VirtualClock,
 )
@@ -109,7 +109,7 @@ def test_lost_qm33_notifications_are_counted_by_their_numbers():
         while sum(isinstance(one, Ranges) for one in said) < 3:
             said += driver.poll(0.1)
         driver.close()
-    lost = [dict(one.values).get("notifications lost") for one in said if isinstance(one, Remark)]
+    lost = [dict(one.values).get("notifications lost") for one in said if isinstance(one, Diagnostic)]
     assert [count for count in lost if count] == ["3"]
 
 
@@ -270,12 +270,12 @@ def test_what_is_no_dwm1001_is_told_so_and_leaves_the_port_free(monkeypatch):
         other.close()
 
 
-def test_a_remark_tells_the_line_that_nobody_understands():
+def test_a_diagnostic_shows_the_line_that_nobody_understands():
     with UwbLines.fake() as device:
         driver = UwbLines("uwb", device.clock, **device.settings)
         driver.open()
         device.garble()
-        remark = next(one for one in heard(driver, Remark) if isinstance(one, Remark))
+        diagnostic = next(one for one in heard(driver, Diagnostic) if isinstance(one, Diagnostic))
         driver.close()
-    assert remark.level is Level.WARN
-    assert dict(remark.values)["line"].startswith("R,a,")
+    assert diagnostic.level is Level.WARN
+    assert dict(diagnostic.values)["line"].startswith("R,a,")

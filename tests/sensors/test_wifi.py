@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusion.driver import Level, Remark
+from fusion.driver import Diagnostic, Level
 from fusion.errors import (
     BusyError,
     DependencyError,
@@ -59,8 +59,8 @@ def scans(said):
     return [one for one in said if isinstance(one, WifiScan)]
 
 
-def remarks(said, level=None):
-    return [one for one in said if isinstance(one, Remark) and level in (None, one.level)]
+def diagnostics(said, level=None):
+    return [one for one in said if isinstance(one, Diagnostic) and level in (None, one.level)]
 
 
 def asked(kernel, command):
@@ -70,18 +70,18 @@ def asked(kernel, command):
 # -- measuring
 
 
-def test_a_scan_has_every_access_point_with_its_age_and_the_remark_says_how_it_came_about():
+def test_a_scan_has_every_access_point_with_its_age_and_the_diagnostic_states_how_it_came_about():
     kernel = FakeKernel()
     said = listen(opened(kernel, names={TWO: "shelf"}), 0.4)
-    scan, remark = said
+    scan, diagnostic = said
     assert [(one.anchor, one.rssi_dbm, seconds(one.age_ns)) for one in scan.readings] == [
         (ONE, -23.0, 0.2),
         ("shelf", -36.0, 0.1),
         (THREE, -34.0, 0.0),
     ]
     assert (scan.time_ns, scan.sensor, scan.seq) == (nanoseconds(0.25), "wifi", 0)
-    assert (remark.level, remark.time_ns) == (Level.OK, nanoseconds(0.3))
-    assert dict(remark.values) == {
+    assert (diagnostic.level, diagnostic.time_ns) == (Level.OK, nanoseconds(0.3))
+    assert dict(diagnostic.values) == {
         "scan": "0",
         "mode": "passive",
         "parts": "1",
@@ -113,9 +113,9 @@ def test_scanning_by_channel_gives_one_measurement_of_one_scan_for_each():
     kernel = FakeKernel()
     said = listen(opened(kernel, per_channel=True), 0.9)
     assert [one["SCAN_FREQUENCIES"] for one in asked(kernel, Command.TRIGGER_SCAN)] == [[2412], [2437], [2462]]
-    (scan,), (remark,) = scans(said), remarks(said)
+    (scan,), (diagnostic,) = scans(said), diagnostics(said)
     assert [one.anchor for one in scan.readings] == [ONE, TWO, THREE]
-    assert dict(remark.values)["parts"] == "3"
+    assert dict(diagnostic.values)["parts"] == "3"
 
 
 def test_only_anchors_with_a_name_are_kept_where_that_is_wished():
@@ -127,29 +127,29 @@ def test_a_scan_that_heard_nobody_is_told_and_no_measurement():
     kernel = FakeKernel(access_points={})
     said = listen(opened(kernel), 0.4)
     assert not scans(said)
-    assert [one.text for one in remarks(said)] == ["heard 0 access points"]
+    assert [one.text for one in diagnostics(said)] == ["heard 0 access points"]
 
 
 def test_a_device_that_stamps_at_the_end_is_found_out_and_its_doubt_is_told():
     kernel = FakeKernel(stamps_at_end=True)
     said = listen(opened(kernel), 0.4)
-    (scan,), (remark,) = scans(said), remarks(said)
+    (scan,), (diagnostic,) = scans(said), diagnostics(said)
     assert {one.age_ns for one in scan.readings} == {0}
     assert scan.time_ns == nanoseconds(0.15), "the middle of the window"
-    assert dict(remark.values)["stamp"] == "scan_end"
-    assert float(dict(remark.values)["stamp_std_s"]) == pytest.approx(0.3 / math.sqrt(12.0), abs=1e-4)
+    assert dict(diagnostic.values)["stamp"] == "scan_end"
+    assert float(dict(diagnostic.values)["stamp_std_s"]) == pytest.approx(0.3 / math.sqrt(12.0), abs=1e-4)
 
 
 def test_without_boot_times_the_doubt_is_the_window_s():
     kernel = FakeKernel(counts_age=True)
-    (remark,) = remarks(listen(opened(kernel), 0.4))
-    assert dict(remark.values)["stamp"] == "scan_end"
+    (diagnostic,) = diagnostics(listen(opened(kernel), 0.4))
+    assert dict(diagnostic.values)["stamp"] == "scan_end"
 
 
 def test_scanning_by_channel_narrows_the_doubt_of_a_device_that_stamps_at_the_end():
     kernel = FakeKernel(stamps_at_end=True)
-    (remark,) = remarks(listen(opened(kernel, per_channel=True, stamp="scan_end"), 0.9))
-    assert float(dict(remark.values)["stamp_std_s"]) == pytest.approx(0.1 / math.sqrt(12.0), abs=1e-4)
+    (diagnostic,) = diagnostics(listen(opened(kernel, per_channel=True, stamp="scan_end"), 0.9))
+    assert float(dict(diagnostic.values)["stamp_std_s"]) == pytest.approx(0.1 / math.sqrt(12.0), abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -195,7 +195,7 @@ def test_what_the_kernel_remembers_from_before_a_foreign_scan_is_refused():
     kernel.clock.sleep(0.9)
     kernel.scan_by_another()
     said = listen(driver, 2.0)
-    borrowed = remarks(said)[0]
+    borrowed = diagnostics(said)[0]
     assert dict(borrowed.values)["mode"] == "borrowed"
     assert dict(borrowed.values)["stale"] == "1"
     assert [one.anchor for one in scans(said)[0].readings] == [ONE, THREE]
@@ -208,7 +208,7 @@ def test_while_another_scans_the_driver_waits_for_that_end_and_asks_once():
     assert len(asked(kernel, Command.TRIGGER_SCAN)) == 1, "refused: busy"
     said = listen(driver, 2.0)
     assert len(asked(kernel, Command.TRIGGER_SCAN)) == 2
-    assert [dict(one.values)["mode"] for one in remarks(said)] == ["borrowed", "passive"]
+    assert [dict(one.values)["mode"] for one in diagnostics(said)] == ["borrowed", "passive"]
     assert len(scans(said)[0].readings) == 3
 
 
@@ -216,8 +216,8 @@ def test_a_scan_on_another_interface_of_the_radio_is_waited_for_but_not_used():
     kernel = FakeKernel()
     kernel.scan_by_another((2412,), index=INDEX + 1)
     said = listen(opened(kernel), 0.5)
-    assert [dict(one.values)["mode"] for one in remarks(said)] == ["passive"]
-    assert dict(remarks(said)[0].values)["trigger_ns"] == str(nanoseconds(0.1)), "as soon as the radio was free"
+    assert [dict(one.values)["mode"] for one in diagnostics(said)] == ["passive"]
+    assert dict(diagnostics(said)[0].values)["trigger_ns"] == str(nanoseconds(0.1)), "as soon as the radio was free"
 
 
 def test_the_end_of_an_earlier_scan_is_not_taken_for_ours():
@@ -230,7 +230,7 @@ def test_the_end_of_an_earlier_scan_is_not_taken_for_ours():
             super()._scan(frequencies_mhz, index, is_seen=is_seen)
 
     said = listen(opened(Racing()), 0.4)
-    assert not remarks(said, Level.WARN)
+    assert not diagnostics(said, Level.WARN)
     assert len(scans(said)) == 1
 
 
@@ -262,7 +262,7 @@ def test_who_listens_triggers_nothing_and_uses_what_others_scan():
     kernel.scan_by_another((2412, 2437))
     said = listen(driver, 1.0)
     assert [one.anchor for one in scans(said)[0].readings] == [ONE, TWO]
-    assert dict(remarks(said)[0].values)["mode"] == "listen"
+    assert dict(diagnostics(said)[0].values)["mode"] == "listen"
     assert not asked(kernel, Command.TRIGGER_SCAN)
     assert driver.spec.least_hz == 0.0, "no silence is too long"
     assert not driver.spec.needs.capabilities
@@ -274,7 +274,7 @@ def test_a_scan_whose_beginning_was_not_seen_counts_from_when_listening_began():
     kernel.clock.sleep(0.12)
     said = listen(opened(kernel, mode="listen"), 1.0)
     assert [one.anchor for one in scans(said)[0].readings] == [TWO, THREE], "the first was heard before"
-    assert dict(remarks(said)[0].values)["stale"] == "1"
+    assert dict(diagnostics(said)[0].values)["stale"] == "1"
 
 
 def test_without_the_right_to_scan_the_driver_says_what_gives_it():
@@ -326,7 +326,7 @@ def test_an_aborted_channel_costs_its_whole_round():
 def test_aborts_however_many_do_not_end_it():
     kernel = FakeKernel(end=Command.SCAN_ABORTED)
     driver = opened(kernel)
-    assert len(remarks(listen(driver, 60.0), Level.WARN)) > 20
+    assert len(diagnostics(listen(driver, 60.0), Level.WARN)) > 20
 
 
 @pytest.mark.parametrize("code", [errno.EIO, errno.ETIMEDOUT])
@@ -382,7 +382,7 @@ def test_a_radio_that_another_keeps_busy_without_end_is_busy_and_the_hint_names_
 def test_what_may_pass_is_tried_again_a_second_later(code):
     kernel = FakeKernel(refusals={Command.TRIGGER_SCAN: code})
     driver = opened(kernel)
-    assert len(remarks(listen(driver, 10.5), Level.WARN)) == 11
+    assert len(diagnostics(listen(driver, 10.5), Level.WARN)) == 11
     assert len(asked(kernel, Command.TRIGGER_SCAN)) == 11
 
 
@@ -450,7 +450,7 @@ def test_lost_events_are_told_and_survived():
     driver = opened(kernel)
     kernel.overruns = 1
     said = listen(driver, 0.5)
-    assert "lost" in remarks(said, Level.WARN)[0].text
+    assert "lost" in diagnostics(said, Level.WARN)[0].text
     assert len(scans(said)) == 1
 
 
@@ -472,7 +472,7 @@ def test_unplugged_in_the_middle_of_a_scan_it_is_lost_and_the_keeper_brings_it_b
     assert keeper.state is State.BACKOFF
     kernel.is_there = True
     said = [one.said for _ in range(600) for one in keeper.turn(POLL_S)]
-    assert sum("is back" in one.text for one in remarks(said)) == 1
+    assert sum("is back" in one.text for one in diagnostics(said)) == 1
     assert len(scans(said)) > 10
 
 
@@ -527,8 +527,8 @@ def test_whatever_happens_nothing_stale_is_shown_as_fresh(data):
             driver.open()
             continue
         for scan in scans(said):
-            (remark,) = remarks(said)
-            told = dict(remark.values)
+            (diagnostic,) = diagnostics(said)
+            told = dict(diagnostic.values)
             began_ns, done_ns = int(told["trigger_ns"]), int(told["done_ns"])
             for one in scan.readings:
                 heard_ns, set_ns = scan.time_ns - one.age_ns, nanoseconds(-one.rssi_dbm - 20.0)

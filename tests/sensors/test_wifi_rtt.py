@@ -5,7 +5,7 @@ import itertools
 
 import pytest
 
-from fusion.driver import Level, Remark
+from fusion.driver import Diagnostic, Level
 from fusion.errors import DeviceLostError, NotPermittedError, SettingError, UnsupportedError
 from fusion.values import Ranges, nanoseconds, seconds
 from sensors.wifi.ftm import LIGHT_M_PER_PS, Status, read_attempts, request
@@ -98,26 +98,26 @@ def test_a_result_without_status_or_address_says_nothing():
 
 def test_a_round_has_every_range_with_its_doubt_at_the_time_of_the_last_answer():
     kernel = FakeKernel()
-    ranges, remark = listen(opened(kernel, peers=[PEERS[0] | {"name": "door"}, *PEERS[1:]]), 0.2)
+    ranges, diagnostic = listen(opened(kernel, peers=[PEERS[0] | {"name": "door"}, *PEERS[1:]]), 0.2)
     assert [(one.anchor, one.range_m) for one in ranges.readings] == [("door", 1.414), (TWO, 5.099), (THREE, 4.472)]
     assert [one.std_m for one in ranges.readings] == pytest.approx([0.1] * 3, abs=1e-4)
     assert (ranges.time_ns, ranges.seq) == (nanoseconds(0.09), 0)
-    assert (remark.level, remark.text) == (Level.OK, "3 of 3 ranges")
-    assert dict(remark.values)["door"] == "success, 1.414 m, std 0.100 m, -23 dBm"
+    assert (diagnostic.level, diagnostic.text) == (Level.OK, "3 of 3 ranges")
+    assert dict(diagnostic.values)["door"] == "success, 1.414 m, std 0.100 m, -23 dBm"
 
 
 def test_a_peer_that_does_not_answer_is_told_and_the_others_are_measured():
     kernel = FakeKernel()
     kernel.access_points[TWO].range_m = None
-    ranges, remark = listen(opened(kernel), 0.2)
+    ranges, diagnostic = listen(opened(kernel), 0.2)
     assert [one.anchor for one in ranges.readings] == [ONE, THREE]
-    assert remark.level is Level.WARN
-    assert dict(remark.values)[TWO] == "timeout"
+    assert diagnostic.level is Level.WARN
+    assert dict(diagnostic.values)[TWO] == "timeout"
 
 
 def test_if_no_peer_answers_there_is_no_measurement():
-    (remark,) = listen(opened(FakeKernel(access_points={})), 0.2)
-    assert (remark.level, remark.text) == (Level.WARN, "0 of 3 ranges")
+    (diagnostic,) = listen(opened(FakeKernel(access_points={})), 0.2)
+    assert (diagnostic.level, diagnostic.text) == (Level.WARN, "0 of 3 ranges")
 
 
 def test_rounds_keep_their_period_and_numbers():
@@ -153,7 +153,9 @@ def test_rounds_that_never_end_are_told_and_end_in_a_call_for_a_person():
     said = []
     with pytest.raises(UnsupportedError, match="3 times in a row"):
         listen(driver, 60.0, said)
-    assert [one.text for one in said if isinstance(one, Remark)] == ["a round of ranging did not end within 12 s"] * 2
+    assert [one.text for one in said if isinstance(one, Diagnostic)] == [
+        "a round of ranging did not end within 12 s"
+    ] * 2
 
 
 @pytest.mark.parametrize("code", [errno.EBUSY, errno.EAGAIN])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from fusion import BootClock, DriverError, Remark, Said, WheelTicks
+from fusion import BootClock, Diagnostic, DriverError, DriverOutput, WheelTicks
 from kernel.guest.gpio import SimulatedGpio
 from sensors.wheels.encoders import Encoders
 
@@ -51,12 +51,12 @@ def turn(chip: SimulatedGpio, pulses: list[int]) -> None:
 
 
 def report(wheels: Encoders) -> dict[str, Any]:
-    """The counts of the next report but one, for which all edges until now were read, and the remarks until then."""
-    said: list[Said] = []
+    """Counts of the next report but one, for which all edges until now were read, and the diagnostics until then."""
+    said: list[DriverOutput] = []
     while sum(isinstance(one, WheelTicks) for one in said) < 2:
         said += wheels.poll(1.0)
-    remarks = [{"text": one.text, **dict(one.values)} for one in said if isinstance(one, Remark)]
-    return {"counts": [one.counts for one in said if isinstance(one, WheelTicks)][-1], "remarks": remarks}
+    diagnostics = [{"text": one.text, **dict(one.values)} for one in said if isinstance(one, Diagnostic)]
+    return {"counts": [one.counts for one in said if isinstance(one, WheelTicks)][-1], "diagnostics": diagnostics}
 
 
 def loss(wheels: Encoders) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from fusion import BootClock, NotFoundError, Ranges, Remark, Said
+from fusion import BootClock, Diagnostic, DriverOutput, NotFoundError, Ranges
 from kernel.guest.serial import NEAR, Module, UsbSerial
 from sensors.onboard.driver_lifecycle import Keeper
 from sensors.uwb.dwm1001 import FakeShell, UwbDwm1001
@@ -46,18 +46,20 @@ def story(usb: UsbSerial, driver: SerialRanging, firmware: Callable[[], Talker],
         found = [found.id for found in driver.discover()]
         keeper.close()
     usb.unplug()
-    remarks = [[one.level.name, one.text] for one in said if isinstance(one, Remark) and dict(one.values).get("state")]
-    return {"ranges": ranges(said), "remarks": remarks, "losses": keeper.losses, "found": found}
+    diagnostics = [
+        [one.level.name, one.text] for one in said if isinstance(one, Diagnostic) and dict(one.values).get("state")
+    ]
+    return {"ranges": ranges(said), "diagnostics": diagnostics, "losses": keeper.losses, "found": found}
 
 
-def turn_until(keeper: Keeper, holds: Callable[[list[Said]], bool]) -> list[Said]:
+def turn_until(keeper: Keeper, holds: Callable[[list[DriverOutput]], bool]) -> list[DriverOutput]:
     """What the keeper hears until `holds` is true of it."""
-    said: list[Said] = []
+    said: list[DriverOutput] = []
     while not holds(said):
         said += [received.said for received in keeper.turn(0.1)]
     return said
 
 
-def ranges(said: list[Said]) -> list[list[tuple[str, float]]]:
+def ranges(said: list[DriverOutput]) -> list[list[tuple[str, float]]]:
     """Anchor and metres of each message."""
     return [[(reading.anchor, reading.range_m) for reading in one.readings] for one in said if isinstance(one, Ranges)]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 from typing import Any
 
-from fusion.driver import BootClock, Remark
+from fusion.driver import BootClock, Diagnostic
 from fusion.errors import DriverError
 from fusion.values import WifiScan
 from kernel.guest.nl80211 import Scanner
@@ -51,21 +51,21 @@ def wifi(**settings: Any) -> Wifi:
     return Wifi("wifi", CLOCK, period_s=0.0, **{"frequencies_mhz": FREQUENCIES_MHZ, **settings})
 
 
-def said(driver: Wifi) -> Iterator[tuple[WifiScan | None, Remark]]:
-    """What an open driver says: each remark with its scan, if it has one."""
+def said(driver: Wifi) -> Iterator[tuple[WifiScan | None, Diagnostic]]:
+    """What an open driver says: each diagnostic with its scan, if it has one."""
     for _ in range(POLLS):
         batch = driver.poll(POLL_S)
-        for remark in (one for one in batch if isinstance(one, Remark)):
-            yield next((one for one in batch if isinstance(one, WifiScan)), None), remark
+        for diagnostic in (one for one in batch if isinstance(one, Diagnostic)):
+            yield next((one for one in batch if isinstance(one, WifiScan)), None), diagnostic
     raise TimeoutError("the driver says nothing")
 
 
-def told(heard: WifiScan | None, remark: Remark) -> dict[str, Any]:
+def told(heard: WifiScan | None, diagnostic: Diagnostic) -> dict[str, Any]:
     """For the host."""
-    values = dict(remark.values)
+    values = dict(diagnostic.values)
     return {
-        "level": remark.level.name,
-        "text": remark.text,
+        "level": diagnostic.level.name,
+        "text": diagnostic.text,
         **{key: values.get(key, "") for key in ("mode", "parts", "stamp", "stale", "heard")},
         "rssi": {} if heard is None else {one.anchor: one.rssi_dbm for one in heard.readings},
         "ages_s": [] if heard is None else [one.age_ns / 1e9 for one in heard.readings],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fusion.driver import BootClock, Remark
+from fusion.driver import BootClock, Diagnostic
 from fusion.errors import DriverError
 from fusion.values import Ranges
 from kernel.guest.medium import NAME, NEW_RADIO, address
@@ -55,8 +55,8 @@ def one_round() -> dict[str, Any]:
             break
     driver.close()
     ranges = [list(one) for batch in said if isinstance(batch, Ranges) for one in batch.readings]
-    remarks = [[one.level.name, one.text, *map(list, one.values)] for one in said if isinstance(one, Remark)]
-    return {"ranges": ranges, "remarks": remarks}
+    diagnostics = [[one.level.name, one.text, *map(list, one.values)] for one in said if isinstance(one, Diagnostic)]
+    return {"ranges": ranges, "diagnostics": diagnostics}
 
 
 def refusal(driver: WifiRtt) -> list[str] | None:
