@@ -1,21 +1,24 @@
-"""Estimators and drivers by name, ours found exactly as strangers': by Python entry points, brought in when asked for.
+"""Plug-ins by name, ours found exactly as strangers': by Python entry points, each imported when it is asked for.
 
 A plug-in distribution declares, for instance,
 
     [project.entry-points."fusion.estimators"]
     my_filter = "my_package.my_module:MyFilter"
 
-`build` makes an estimator and refuses parameters it does not have. `registered` adds one for the length of a test.
-A plug-in whose package is missing is not installed: `available` leaves it out, `load` refuses it with the remedy.
+The groups are the constants below; `docs/plugin.md` shows one of each. `load` refuses what cannot be imported, what
+lacks the parts of its group, and a name that two distributions claim; a plug-in whose package is missing is not
+installed. `build` makes an estimator and refuses parameters it does not have. `registered` adds one for the length of
+a test.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fusion.errors import FusionError, NotInstalledError, ParameterError, PluginError, did_you_mean
 from fusion.estimator import Estimator
@@ -29,6 +32,35 @@ if TYPE_CHECKING:
 DISTRIBUTION = "fusion-localization"
 ESTIMATORS = "fusion.estimators"
 SENSORS = "fusion.sensors"
+IMPORTERS = "fusion.importers"
+FAULTS = "fusion.faults"
+VERBS = "fusion.verbs"
+
+
+class Shape(NamedTuple):
+    """The parts of every plug-in of a group, as far as they can be seen without running it."""
+
+    parts: Mapping[str, type] = MappingProxyType({})
+    """Attributes and their types."""
+    called_with: Mapping[str, int] = MappingProxyType({})
+    """How many arguments a part takes by position, ``self`` of a method among them."""
+    built_with: int = 0
+    """How many the plug-in itself takes by position, before its settings; 0: it is not called."""
+    named_by: str | None = None
+    """The part that must be the name of the entry point."""
+
+
+SHAPES: Mapping[str, Shape] = {
+    ESTIMATORS: Shape({"summary": str, "tags": Set, "start": object, "step": object, "estimate": object}, built_with=1),
+    SENSORS: Shape({"summary": str, "discover": object, "open": object, "poll": object, "close": object}, built_with=2),
+    IMPORTERS: Shape(built_with=1),
+    FAULTS: Shape(
+        {"kind": str, "apply": object, "place": object, "lasts": object, "__dataclass_fields__": object},
+        {"apply": 3},
+        named_by="kind",
+    ),
+    VERBS: Shape({"configure": object, "run": object}, {"configure": 1, "run": 1}),
+}
 
 _in_process: dict[str, type[Any]] = {}
 
@@ -49,9 +81,28 @@ def names(group: str = ESTIMATORS) -> tuple[str, ...]:
     return tuple(sorted({*_entry_points(group), *extra}))
 
 
-def built_in_names() -> tuple[str, ...]:
-    """The estimators of this distribution, sorted; nothing is imported."""
-    found = _entry_points(ESTIMATORS)
+class Origin(NamedTuple):
+    """A distribution that declares a plug-in, and its own one-line summary."""
+
+    distribution: str
+    summary: str
+
+    def __str__(self) -> str:
+        """The summary, if there is one, and the distribution."""
+        return f"{self.summary} ({self.distribution})".strip()
+
+
+def origins(name: str, group: str) -> list[Origin]:
+    """The distributions that declare ``name`` in ``group``; nothing is imported."""
+    found = _entry_points(group).get(name, [])
+    return [
+        Origin(_owner(claim), "" if claim.dist is None else claim.dist.metadata["Summary"] or "") for claim in found
+    ]
+
+
+def built_in_names(group: str = ESTIMATORS) -> tuple[str, ...]:
+    """The names of this distribution in ``group``, sorted; nothing is imported."""
+    found = _entry_points(group)
     return tuple(sorted(name for name in found if any(_owner(claim) == DISTRIBUTION for claim in found[name])))
 
 
@@ -89,19 +140,66 @@ def in_sentences(errors: Iterable[PluginError]) -> list[str]:
 
 
 def load(name: str, group: str = ESTIMATORS) -> Any:  # noqa: ANN401 - whatever the entry point names
-    """What the entry point ``name`` of ``group`` stands for; raises `PluginError` that says how to get it, and
+    """The object that the entry point ``name`` of ``group`` names; raises `PluginError` with the remedy, and
     `NotInstalledError` where that is to install a package.
     """
     if group == ESTIMATORS and name in _in_process:
         return _in_process[name]
     claims = _entry_points(group).get(name, [])
     if not claims:
-        kind = group.removeprefix("fusion.").removesuffix("s")
-        raise PluginError(f"no {kind} named {name!r} is installed; {did_you_mean(name, names(group))}")
+        raise PluginError(f"no {_kind(group)} named {name!r} is installed; {_remedy(name, group)}")
     if len(claims) > 1:
-        owners = ", ".join(f"{claim.value} of {_owner(claim)}" for claim in claims)
-        raise PluginError(f"{name!r} is claimed twice ({owners}); uninstall one of them")
-    return _import(claims[0])
+        raise PluginError(f"{name!r} is claimed twice ({', '.join(map(_origin, claims))}); uninstall one of them")
+    made = _import(claims[0])
+    if flaw := _flaw(made, name, SHAPES[group]):
+        article = "an" if _kind(group)[0] in "aeiou" else "a"
+        raise PluginError(
+            f"{name!r} ({_origin(claims[0])}) is not {article} {_kind(group)}: {flaw}; correct it, or uninstall that"
+        )
+    return made
+
+
+def _kind(group: str) -> str:
+    return group.removeprefix("fusion.").removesuffix("s")
+
+
+def _remedy(name: str, group: str) -> str:
+    if group != VERBS and not built_in_names(group):
+        return f"{DISTRIBUTION} was installed before it declared any; install it anew (`make` does, in a checkout)"
+    return did_you_mean(name, names(group))
+
+
+def _flaw(made: Any, name: str, shape: Shape) -> str | None:  # noqa: ANN401 - whatever the entry point names
+    """The first reason why ``made`` is no plug-in of that shape; None where there is none."""
+    if lacking := [part for part in shape.parts if not hasattr(made, part)]:
+        return f"it lacks {', '.join(lacking)}"
+    for part, kind in shape.parts.items():
+        if not isinstance(own := getattr(made, part), kind):
+            return f"its {part} is {own!r}, no {kind.__name__}"
+    for part, count in shape.called_with.items():
+        if not _takes(getattr(made, part), count, settings=False):
+            return f"its {part} does not take {count} argument{'s' if count > 1 else ''} by position"
+    if shape.built_with and not _takes(made, shape.built_with, settings=True):
+        return f"it cannot be called with {shape.built_with} argument{'s' if shape.built_with > 1 else ''} by position"
+    if shape.named_by and (own := getattr(made, shape.named_by)) != name:
+        return f"its {shape.named_by} is {own!r}"
+    return None
+
+
+def _takes(called: Any, count: int, *, settings: bool) -> bool:  # noqa: ANN401 - whatever the entry point names
+    """Whether it can be called with ``count`` arguments by position, and nothing else unless it has ``settings``."""
+    import inspect
+
+    try:
+        signature = inspect.signature(called)
+        (signature.bind_partial if settings else signature.bind)(*[None] * count)
+    except (TypeError, ValueError):  # the latter for a callable of C without a signature
+        return False
+    return True
+
+
+def _origin(entry: EntryPoint) -> str:
+    return f"{entry.value} of {_owner(entry)}"
 
 
 def _owner(entry: EntryPoint) -> str:
@@ -120,10 +218,12 @@ def _import(entry: EntryPoint) -> Any:  # noqa: ANN401
         if "is not a package" in str(error):
             remedy = f"a file {package}.py beside your script hides the package; rename it"
         else:
-            remedy = f"install what it needs (of {_owner(entry)}), or uninstall that"
-        raise PluginError(f"{entry.name!r} ({entry.value}) cannot be imported: {error}; {remedy}") from error
-    except Exception as error:
-        raise PluginError(f"{entry.name!r} ({entry.value}) failed while being imported: {error!r}") from error
+            remedy = "install what it needs, or uninstall that"
+        raise PluginError(f"{entry.name!r} ({_origin(entry)}) cannot be imported: {error}; {remedy}") from error
+    except (Exception, SystemExit) as error:
+        raise PluginError(
+            f"{entry.name!r} ({_origin(entry)}) failed while being imported: {error!r}; correct it, or uninstall that"
+        ) from error
 
 
 def _missing(entry: EntryPoint, package: str) -> str:
@@ -140,11 +240,16 @@ def _missing(entry: EntryPoint, package: str) -> str:
     return f"not installed, the package {package} is missing; {remedy}"
 
 
-def parameters(estimator: type[Any]) -> dict[str, inspect.Parameter]:
-    """The parameters an estimator class takes beside the world, by name."""
+def parameters(made: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+    """The parameters that an estimator takes beside the world, or an importer beside the folder, by name; raises
+    `PluginError` for annotations that mean nothing.
+    """
     import inspect
 
-    return dict(list(inspect.signature(estimator, eval_str=True).parameters.items())[1:])
+    try:
+        return dict(list(inspect.signature(made, eval_str=True).parameters.items())[1:])
+    except Exception as error:
+        raise PluginError(f"the annotations of {made!r} cannot be read: {error!r}; correct them") from error
 
 
 def build(name: str, world: World, options: Mapping[str, object] | None = None) -> Estimator[Any]:

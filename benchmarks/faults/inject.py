@@ -15,52 +15,37 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from benchmarks.faults.fault import Fault
-from benchmarks.faults.message_faults import Clock, Delay, Drop, GyroDrop
-from benchmarks.faults.motion_faults import BadStart, Freeze, GyroBias, Kidnap, Slip
-from benchmarks.faults.radio_faults import Nlos, Outlier, PowerStep, RssiNoise
 from benchmarks.faults.row_selection import Windows
 from benchmarks.faults.run_columns import RunColumns
-from fusion import ParameterError, WorldError
-from fusion.errors import did_you_mean
+from fusion import FusionError, ParameterError, PluginError, WorldError, load, names
+from fusion.plugins import FAULTS
 from fusion.schema import read_record
 from logs.run import Run
 
-KINDS: Mapping[str, type[Fault]] = {
-    fault.kind: fault
-    for fault in (
-        Drop,
-        RssiNoise,
-        PowerStep,
-        Nlos,
-        Outlier,
-        Delay,
-        Clock,
-        Slip,
-        Freeze,
-        GyroBias,
-        GyroDrop,
-        Kidnap,
-        BadStart,
-    )
-}
 FAULT_STREAM = 1
 """First number of every key of random numbers that belong to faults; those of estimators have another."""
 
 
 def read_fault(table: object, where: str) -> Fault:
     """A fault from its TOML table, ``{kind = "drop", topic = "wifi", source = "ap2", windows = [[20, 50]]}``; raises
-    `ParameterError` that names ``where``.
+    `ParameterError` that names ``where``. ``kind`` is the name of an installed fault (`fusion.plugins.FAULTS`).
     """
     if not isinstance(table, Mapping):
         raise ParameterError(f'{where}: expected a table such as {{kind = "drop", topic = "wifi"}}, got {table!r}')
-    options = {key: value for key, value in table.items() if key != "kind"}
-    kind = str(table.get("kind"))
-    if kind not in KINDS:
-        raise ParameterError(f"{where}: there is no kind of fault {kind!r}; {did_you_mean(kind, KINDS)}")
+    if "kind" not in table:
+        raise ParameterError(f"{where}: kind is missing; add it, one of {', '.join(names(FAULTS))}")
+    kind = str(table["kind"])
     try:
-        return read_record(KINDS[kind], options, f"{where} ({kind})")
+        made: type[Fault] = load(kind, FAULTS)
+        return read_record(made, {key: table[key] for key in table if key != "kind"}, f"{where} ({kind})")
+    except PluginError as error:
+        raise ParameterError(f"{where}: {error}") from error
     except WorldError as error:  # the reader of world files, at work on something else
         raise ParameterError(str(error)) from error
+    except FusionError:
+        raise
+    except Exception as error:
+        raise PluginError(f"{where} ({kind}): cannot be made: {error!r}; correct that fault") from error
 
 
 def apply_faults(run: Run, faults: Sequence[Fault], *, suite_seed: int, fault_id: str, seed: int) -> Run:

@@ -3,67 +3,72 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from fusion.errors import LogError, ParameterError, RecordingError, did_you_mean
-
-KINDS = {
-    "csv": "logs.importers.csv_bundle",
-    "tuc": "logs.importers.tuc",
-    "plaza": "logs.importers.plaza",
-    "cdoa": "logs.importers.cdoa",
-    "kolakowski": "logs.importers.kolakowski",
-    "haiyao": "logs.importers.haiyao",
-    "rosbag": "logs.importers.rosbag",
-}
-"""Kinds of recordings and the module that reads each; one has ``recordings(folder)``."""
-OPEN = "rosbag"
-"""The kind that does not say by itself what is what: its ``recordings`` takes options, and a file will do."""
+from fusion.errors import LogError, ParameterError, PluginError, RecordingError
+from fusion.plugins import IMPORTERS, load, names, parameters
+from logs.importers.foreign_recording import Recording
 
 
 def import_recordings(
     kind: str,
-    folder: Path,
+    source: Path,
     output: Path,
     *,
     force: bool = False,
     **options: Any,  # noqa: ANN401 - a kind's
 ) -> list[Path]:
-    """Write every run found in ``folder`` as a log; answers their paths.
+    """Write every run found in ``source``, a folder or a file, as a log; answers their paths.
 
-    ``output`` ending in ``.mcap`` is one log, and the folder must hold one run; else a folder that gets one log a run.
-    The kind `rosbag` takes a file as well, and the ``options`` of `logs.importers.rosbag.recordings`. What is
-    lost or doubtful stands on stderr. A log that exists is written over only with ``force``, and nothing is written
-    where one of several exists. Raises `RecordingError` for an unknown kind, a folder without such files, or a
-    file that cannot be understood, `ParameterError` for options that the kind does not take, `LogError` for a log that
-    exists.
+    ``kind`` is the name of an installed importer (`fusion.plugins.IMPORTERS`): a function of ``source``, and of those
+    ``options`` that it names, which answers `Recording`s. ``output`` ending in ``.mcap`` is one log, and the source
+    must hold one run; else a folder that gets one log a run. A log that exists is written over only with ``force``, and
+    nothing is written where one of several exists. Warnings of lost or doubtful data stand on stderr. Raises
+    `PluginError` for an importer that is not there or is broken, `RecordingError` for a source without such files or
+    with one that cannot be understood, `ParameterError` for options that the kind does not take,
+    `LogError` for a log that exists.
     """
-    if kind not in KINDS:
-        raise RecordingError(f"there is no importer {kind!r}; {did_you_mean(kind, KINDS)}")
-    if options and kind != OPEN:
-        raise ParameterError(f"{kind} takes no {', '.join(sorted(options))}: its files say it; only {OPEN} does")
-    if not folder.is_dir() and not (kind == OPEN and folder.is_file()):
-        raise RecordingError(f"{folder}: no such folder; give the folder that holds the recording")
-    found = list(importlib.import_module(KINDS[kind]).recordings(folder, **options))
+    read = load(kind, IMPORTERS)
+    known = parameters(read)
+    if others := sorted(options.keys() - known):
+        raise ParameterError(f"{kind} takes no {', '.join(others)}; leave that out")
+    if lacking := [name for name, one in known.items() if one.default is one.empty and name not in options]:
+        raise ParameterError(f"{kind} needs {', '.join(lacking)}; `fusion import --help` shows the options there are")
+    if not source.exists():
+        raise RecordingError(f"{source}: no such folder; give the folder that holds the recording")
+    found = _recordings(kind, read(source, **options))
     for warning in (warning for recording in found for warning in recording.doubts):
         sys.stderr.write(f"warning: {warning}\n")
+    paths = _free_paths(output, found, force=force)
+    return [recording.write(path) for recording, path in zip(found, paths, strict=True)]
+
+
+def _free_paths(output: Path, found: Sequence[Recording], *, force: bool) -> list[Path]:
     if output.suffix == ".mcap" and len(found) != 1:
-        names = ", ".join(recording.name for recording in found)
-        raise RecordingError(f"{folder} holds {len(found)} runs ({names}); give a folder with -o, not one file")
+        run_names = ", ".join(recording.name for recording in found)
+        raise RecordingError(f"the folder holds {len(found)} runs ({run_names}); give a folder with -o, not one file")
     paths = [output if output.suffix == ".mcap" else output / f"{recording.name}.mcap" for recording in found]
     for path in paths:
         if path.exists() and not (force and path.is_file()):
             raise LogError(f"{path}: exists already; choose another name, or write over a file with --force")
-    return [recording.write(path) for recording, path in zip(found, paths, strict=True)]
+    return paths
+
+
+def _recordings(kind: str, answer: object) -> list[Recording]:
+    found = []
+    for one in answer if isinstance(answer, Iterable) else [answer]:
+        if not isinstance(one, Recording):
+            raise PluginError(f"the importer {kind} answered {one!r}; it must answer `Recording`s (docs/plugin.md)")
+        found.append(one)
+    return found
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Arguments of `fusion import`."""
-    parser.add_argument("kind", metavar="KIND", help=f"what wrote the recording: {', '.join(KINDS)}")
+    parser.add_argument("kind", metavar="KIND", help=f"the importer: {', '.join(names(IMPORTERS))}")
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="the folder with its files; a bag may be a file")
     parser.add_argument(
         "-o",
@@ -74,11 +79,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="a log (*.mcap), or a folder for one log per run",
     )
     parser.add_argument("--force", action="store_true", help="write over logs that exist")
-    bag_options(parser.add_argument_group("rosbag only"))
+    bag_options(parser.add_argument_group("rosbag, and other importers that take them"))
 
 
 def bag_options(bag: argparse._ArgumentGroup) -> None:
-    """What a bag does not say by itself, for every verb that takes one."""
+    """Options for what a bag does not state by itself, for every verb that takes one."""
     bag.add_argument("--world", metavar="WORLD.toml", type=Path, help="the anchors and the robot")
     bag.add_argument(
         "--topic",

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.runner.suite_file import load_suite
 from fusion import World
-from fusion.cli.main import VERBS
+from fusion.cli.verbs import VERBS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fusion.cli.main import GROUPS, VERBS, _verb_parser, main
+from fusion.cli.main import _verb_parser, main
+from fusion.cli.verbs import GROUPS, VERBS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))}

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fusion import Increment, Odometry, Ranges, RecordingError, WifiScan
+from fusion import Increment, Odometry, PluginError, Ranges, RecordingError, WifiScan
 from logs.cli.import_ import import_recordings
 from logs.reader import read_run
 
@@ -157,7 +157,7 @@ def test_folder_without_such_files_is_refused(tmp_path, kind):
 
 
 def test_unknown_kind_is_answered_with_the_nearest():
-    with pytest.raises(RecordingError, match="did you mean 'plaza'"):
+    with pytest.raises(PluginError, match="no importer named 'plazza' is installed; did you mean 'plaza'"):
         import_recordings("plazza", Path(), Path("out"))
 
 

@@ -9,16 +9,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.faults.inject import KINDS, apply_faults, fault_seed, outages, read_fault, stable_hash
+from benchmarks.faults.inject import apply_faults, fault_seed, outages, read_fault, stable_hash
 from benchmarks.faults.message_faults import Clock, Delay, Drop, GyroDrop
 from benchmarks.faults.motion_faults import WHEELS, BadStart, Freeze, GyroBias, Kidnap, Slip
 from benchmarks.faults.radio_faults import Nlos, Outlier, PowerStep, RssiNoise
 from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors
 from benchmarks.runner.estimator_run import run_estimator
-from fusion import Gyro, MeasurementError, Odometry, ParameterError, Ranges, RssiReading, WheelTicks, WifiScan
+from fusion import (
+    Gyro,
+    MeasurementError,
+    Odometry,
+    ParameterError,
+    Ranges,
+    RssiReading,
+    WheelTicks,
+    WifiScan,
+    built_in_names,
+    load,
+)
 from fusion.conformance.synthetic_run import Drive
 from fusion.odometry import Odometer
+from fusion.plugins import FAULTS
 from fusion.timeline import order
 from fusion.values import nanoseconds, seconds
 from fusion.world import DRIVES
@@ -101,19 +113,23 @@ TABLES = {
 }
 
 
+KINDS = built_in_names(FAULTS)
+WITH_WINDOWS = [kind for kind in KINDS if "windows" in load(kind, FAULTS).__dataclass_fields__]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_can_be_read_and_changes_the_run(kind):
     fault = read_fault({"kind": kind, **TABLES[kind]}, "faults[0]")
-    assert (fault.kind, type(fault)) == (kind, KINDS[kind])
+    assert (fault.kind, type(fault)) == (kind, load(kind, FAULTS))
     assert content(with_faults(fault)) != content(RUN)
 
 
 @pytest.mark.parametrize(
     ("table", "told"),
     [
-        ({"kind": "dorp", "topic": "wifi"}, r"there is no kind of fault 'dorp'; did you mean 'drop'\?"),
-        ({"topic": "wifi"}, "there is no kind of fault 'None'; known: bad_start"),
-        ({"kind": ["drop"]}, "there is no kind of fault"),
+        ({"kind": "dorp", "topic": "wifi"}, r"faults\[0\]: no fault named 'dorp' is installed; did you mean 'drop'\?"),
+        ({"topic": "wifi"}, r"faults\[0\]: kind is missing; add it, one of bad_start"),
+        ({"kind": ["drop"]}, r"no fault named \"\['drop'\]\""),
         ("drop", "expected a table such as"),
         ({"kind": "drop"}, r"faults\[0\] \(drop\): topic is missing"),
         ({"kind": "drop", "topic": "wfi"}, r"topic 'wfi' cannot have the fault drop; did you mean 'wifi'\?"),
@@ -236,7 +252,7 @@ def test_no_fault_changes_nothing(run):
     assert content(with_faults(run=run)) == content(run)
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if "windows" in KINDS[kind].__dataclass_fields__])
+@pytest.mark.parametrize("kind", WITH_WINDOWS)
 @pytest.mark.parametrize("windows", [[], [[1e6, 2e6]]], ids=["none", "past the end"])
 def test_windows_without_messages_change_nothing(kind, windows):
     fault = read_fault({"kind": kind, **TABLES[kind], "windows": windows}, "faults[0]")
@@ -277,7 +293,7 @@ def test_other_topics_are_never_touched(kind):
     assert others(faulty, TOUCHED[kind]) == others(RUN, TOUCHED[kind])
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if "windows" in KINDS[kind].__dataclass_fields__])
+@pytest.mark.parametrize("kind", WITH_WINDOWS)
 def test_messages_outside_the_windows_are_never_touched(kind):
     """Wheel ticks apart: they are sums, so what was lost in a window stays lost."""
     fault = read_fault({"kind": kind, **TABLES[kind], "windows": WINDOWS}, "faults[0]")

@@ -11,9 +11,9 @@ from benchmarks.runner import suite as definition
 from benchmarks.runner.plan import estimator_identity, read_faults
 from benchmarks.runner.suite import builtin_suites
 from benchmarks.runner.suite_file import load_suite
-from fusion import SuiteError
+from fusion import SuiteError, names
 from fusion.cli.main import main
-from logs.cli.import_ import KINDS
+from fusion.plugins import IMPORTERS
 from sensors.simulation.scenario import builtin_names
 
 SUITES = Path(definition.__file__).parents[1] / "suites"
@@ -120,7 +120,7 @@ def test_suites_have_enough_runs_for_a_verdict():
 @pytest.mark.parametrize("name", sorted(CATALOGUE))
 def test_catalogue_tells_where_a_set_comes_from_and_on_what_terms(name):
     entry = CATALOGUE[name]
-    assert entry["importer"] in KINDS
+    assert entry["importer"] in names(IMPORTERS)
     assert entry["address"].startswith("https://")
     assert len(entry["commit"]) == 40
     assert entry["licence"]
