@@ -36,8 +36,8 @@ def test_page_was_made_of_at_least_200_runs():
 
 @pytest.mark.parametrize(("k", "place"), [(0, 0), (1, 0), (2, 0), (0, -1)])
 def test_recorded_runs_come_again(k, place):
-    """The first run of each environment and the last of one, every lane. Where this fails an estimator or the simulator has
-    changed: write the page anew with its command.
+    """The first run of each environment and the last of one, every lane. Where this fails an estimator or the simulator
+    has changed: write the page anew with its command.
     """
     environment, record = ENVIRONMENTS[k], RECORD["environments"][k]
     seeds = range(RECORD["first_seed"], RECORD["first_seed"] + RECORD["trials"])
