@@ -1,7 +1,13 @@
 """What holds for all tests."""
 
+import os
+
 import pytest
 from hypothesis import settings
+
+# Before NumPy is there: its threads wait for one another by spinning, which costs a core that other tests want.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
 
 # A deadline measures the machine's load, not the code; speed is measured elsewhere.
 settings.register_profile("fusion", deadline=None, derandomize=True)

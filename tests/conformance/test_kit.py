@@ -1,5 +1,6 @@
 """The kit is held against one correct estimator and against small changes of it, each of which it must notice."""
 
+import json
 import math
 from typing import NamedTuple
 
@@ -26,8 +27,9 @@ from fusion import (
     wrap_angle,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.cli.check import run as run_check
-from fusion.conformance.checks import Outcome, checks, run_checks
+from fusion.cli import check as verb
+from fusion.cli.main import main
+from fusion.conformance.checks import Check, Outcome, _verdict, checks, run_checks
 from fusion.conformance.estimator_promises import PROMISES
 
 
@@ -403,30 +405,35 @@ def test_ids_are_unique_and_every_promise_says_why():
     assert all(promise.reason.endswith(".") for promise in PROMISES)
 
 
+def verdict_on(estimator, promise_id, excuse=None):
+    """What `run_checks` makes of one promise, without the others."""
+    (promise,) = (promise for promise in PROMISES if promise.id == promise_id)
+    return _verdict(Check(promise, estimator), excuse)
+
+
 def test_verdicts_tell_broken_excused_and_skipped_apart():
-    with registered("no_gate", NoGate), registered("radio_less", type("Quiet", (Correct,), {"tags": {Tag.NO_RADIO}})):
-        by_id = {verdict.id: verdict for verdict in run_checks("no_gate")}
-        excused = {v.id: v for v in run_checks("no_gate", {"outlier-is-bounded": "it has no gate"})}
-        skipped = {v.id: v for v in run_checks("radio_less")}
-    assert by_id["outlier-is-bounded"].outcome is Outcome.BROKEN
-    assert "moves the pose" in by_id["outlier-is-bounded"].detail
-    assert excused["outlier-is-bounded"].outcome is Outcome.EXCUSED
-    assert skipped["outlier-is-bounded"].outcome is Outcome.SKIPPED
-    assert "no_radio" in skipped["outlier-is-bounded"].detail
+    broken = verdict_on(NoGate, "outlier-is-bounded")
+    excused = verdict_on(NoGate, "outlier-is-bounded", "it has no gate")
+    skipped = verdict_on(type("Quiet", (Correct,), {"tags": {Tag.NO_RADIO}}), "outlier-is-bounded")
+    assert broken.outcome is Outcome.BROKEN
+    assert "moves the pose" in broken.detail
+    assert excused.outcome is Outcome.EXCUSED
+    assert skipped.outcome is Outcome.SKIPPED
+    assert "no_radio" in skipped.detail
 
 
 def test_particles_are_asked_only_of_who_offers_them():
-    with registered("correct", Correct):
-        by_id = {verdict.id: verdict for verdict in run_checks("correct")}
-    assert by_id["particles"].outcome is Outcome.SKIPPED
-    assert "ParticleEstimator" in by_id["particles"].detail
+    skipped = verdict_on(Correct, "particles")
+    assert skipped.outcome is Outcome.SKIPPED
+    assert "ParticleEstimator" in skipped.detail
 
 
-def test_excuse_that_is_not_needed_counts_as_broken():
-    with registered("correct", Correct):
-        by_id = {verdict.id: verdict for verdict in run_checks("correct", {"same-bytes": "for no reason"})}
+def test_excuse_that_is_not_needed_counts_as_broken_and_excuses_nothing_else():
+    with registered("no_gate", NoGate):
+        by_id = {each.id: each for each in run_checks("no_gate", {"same-bytes": "for no reason"})}
     assert by_id["same-bytes"].outcome is Outcome.BROKEN
     assert "take away the excuse" in by_id["same-bytes"].detail
+    assert by_id["outlier-is-bounded"].outcome is Outcome.BROKEN
 
 
 def test_unknown_promise_and_unknown_estimator_are_answered_with_a_hint():
@@ -448,14 +455,13 @@ def test_estimator_that_raises_is_a_verdict_not_a_traceback():
 
 
 @pytest.mark.parametrize(("estimator", "code"), [(Correct, 0), (HeavyWeight, 1)])
-def test_verb_tells_a_line_for_each_promise_and_exits_by_the_result(estimator, code, capsys):
-    import argparse
-    import json
-
+def test_verb_tells_a_line_for_each_promise_and_exits_by_the_result(estimator, code, monkeypatch, capsys):
     with registered("held", estimator):
-        assert run_check(argparse.Namespace(name="held", json=False, driver=False)) == code
+        verdicts = run_checks("held")
+        monkeypatch.setattr(verb, "run_checks", {"held": verdicts}.__getitem__)
+        assert main(["check", "held"]) == code
         text = capsys.readouterr().out
-        assert run_check(argparse.Namespace(name="held", json=True, driver=False)) == code
+        assert main(["check", "held", "--json"]) == code
         rows = json.loads(capsys.readouterr().out)
     assert all(promise.id in text for promise in PROMISES)
     assert [row["id"] for row in rows] == [promise.id for promise in PROMISES]

@@ -34,11 +34,10 @@ def test_page_was_made_of_at_least_200_runs():
     assert RECORD["trials"] >= 200
 
 
-@pytest.mark.parametrize("k", range(3))
-@pytest.mark.parametrize("place", [0, -1])
+@pytest.mark.parametrize(("k", "place"), [(0, 0), (1, 0), (2, 0), (0, -1)])
 def test_recorded_runs_come_again(k, place):
-    """The first and the last run of each environment, every lane. Where this fails an estimator or the simulator has
-    changed: write the page anew with its command.
+    """The first run of each environment and the last of one, every lane. Where this fails an estimator or the simulator
+    has changed: write the page anew with its command.
     """
     environment, record = ENVIRONMENTS[k], RECORD["environments"][k]
     seeds = range(RECORD["first_seed"], RECORD["first_seed"] + RECORD["trials"])

@@ -44,7 +44,7 @@ RECORD = Calibration("by hand", ("a.mcap",), ("00",), "unknown", 3, 0.5, "0")
 @pytest.fixture(scope="module")
 def log(drive, tmp_path_factory):
     """A drive with everything on board, as a file."""
-    run = drive(laps=2, gyro_hz=50.0, wifi_hz=2.0, range_hz=5.0, pause_s=1.5, distance_scale_bias=0.03)
+    run = drive(gyro_hz=50.0, wifi_hz=1.0, range_hz=5.0, pause_s=1.5, distance_scale_bias=0.03)
     path = tmp_path_factory.mktemp("log") / "drive.mcap"
     with RunWriter(path, run.world, name="drive", prior=run.prior) as writer:
         for measurement in run.measurements:

@@ -434,15 +434,20 @@ def test_wrong_clock_leaves_the_true_stamps_with_the_run():
     assert with_faults(Delay("wifi", 0.3)).true_stamps == {}
 
 
+@pytest.fixture(scope="module")
+def by_wheels():
+    """A run whose turns are those of the wheels, and the dead reckoning of it."""
+    run = replace(RUN, world=replace(RUN.world, robot=replace(RUN.world.robot, turn_source="wheels")))
+    return run, run_estimator(run, "dead_reckoning")
+
+
 @pytest.mark.parametrize(
     ("topic", "offset_s"), [("gyro", 0.4), ("gyro", -0.4), ("wifi", 0.5), ("wifi", -0.5), ("wifi", 1.5)]
 )
-def test_score_is_that_of_the_clean_run_for_who_ignores_the_sensor_with_the_wrong_clock(topic, offset_s):
+def test_score_is_that_of_the_clean_run_for_who_ignores_the_sensor_with_the_wrong_clock(by_wheels, topic, offset_s):
     """Odometry alone, its turns from the wheels: answers are as many, as early and as good, whatever clock is wrong."""
-    run = replace(RUN, world=replace(RUN.world, robot=replace(RUN.world.robot, turn_source="wheels")))
-    clean, faulty = (
-        run_estimator(told, "dead_reckoning") for told in (run, with_faults(Clock(topic, offset_s=offset_s), run=run))
-    )
+    run, clean = by_wheels
+    faulty = run_estimator(with_faults(Clock(topic, offset_s=offset_s), run=run), "dead_reckoning")
     instants = evaluation_instants(run.truth)
     expected, got = (errors(instants, match(instants, estimator_run.track)) for estimator_run in (clean, faulty))
     assert faulty.digest != clean.digest

@@ -30,17 +30,22 @@ from sensors.simulation.simulate import simulated_run
 
 PAPER = {ODOMETRY, WIFI, PROPOSED, EKF, *(name + GYRO for name in GYRO_ESTIMATORS)}
 """Estimators that are run whatever is asked for."""
-SEEN = []
 
 
 @pytest.fixture(scope="module")
-def report():
-    """Two runs by two processes, the progress they report left in ``SEEN``."""
-    return reproduce(2, seed=5, workers=2, progress=lambda done, total, what: SEEN.append((done, total)))
+def seen():
+    """What is reported of the progress of the `report`."""
+    return []
 
 
-def test_progress_counts_every_run(report):
-    assert [(done, len(SEEN)) for done in range(1, len(SEEN) + 1)] == SEEN
+@pytest.fixture(scope="module")
+def report(seen):
+    """Two runs of everything, by two processes."""
+    return reproduce(2, seed=5, workers=2, progress=lambda done, total, what: seen.append((done, total)))
+
+
+def test_progress_counts_every_run(report, seen):
+    assert seen == [(done, len(seen)) for done in range(1, len(seen) + 1)]
 
 
 def test_a_seed_gives_its_run_whichever_is_the_first_and_whatever_the_workers(report):
