@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -34,6 +34,7 @@ ESTIMATORS = "fusion.estimators"
 SENSORS = "fusion.sensors"
 IMPORTERS = "fusion.importers"
 FAULTS = "fusion.faults"
+METRICS = "fusion.metrics"
 VERBS = "fusion.verbs"
 
 
@@ -59,6 +60,7 @@ SHAPES: Mapping[str, Shape] = {
         {"apply": 3},
         named_by="kind",
     ),
+    METRICS: Shape({"METRICS": Sequence, "metrics": object}, {"metrics": 1}),
     VERBS: Shape({"configure": object, "run": object}, {"configure": 1, "run": 1}),
 }
 

@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from benchmarks.metrics.families import families
 from benchmarks.runner.adhoc_suite import bench, remarks, tables, write_records
 from fusion.cli.arguments import at_least_one, not_negative
 from fusion.cli.options import parse_settings
@@ -38,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
             workers=arguments.workers,
             progress=progress,
         )
-    for remark in (*(left_out() if chosen is None else ()), *remarks(results)):
+    for remark in (*(left_out() if chosen is None else ()), *families().refused, *remarks(results)):
         sys.stderr.write(f"fusion bench: {remark}\n")
     if arguments.json != Path("-"):
         print_sheets(tables(results))

@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from benchmarks.metrics.families import families
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import Result, read_results, refuse_incomplete
 from benchmarks.runner.store import STORE, Store
@@ -25,9 +26,9 @@ def suite_options(parser: argparse.ArgumentParser) -> None:
 
 
 def opened(arguments: argparse.Namespace) -> tuple[Suite, Store]:
-    """The suite and the store of `suite_options`; what is left out of the suite is reported on stderr."""
+    """The suite and the store of `suite_options`; estimators and metrics that are left out go to stderr."""
     suite = load_suite(arguments.suite)
-    for sentence in suite.left_out:
+    for sentence in (*suite.left_out, *families().refused):
         sys.stderr.write(f"fusion bench: {sentence}\n")
     return suite, Store(arguments.store)
 

@@ -6,27 +6,20 @@ from collections.abc import Mapping
 from itertools import groupby
 from typing import NamedTuple
 
-from benchmarks.metrics import consistency, convergence, drift, innovations, intervals, position, relative_pose
+from benchmarks.metrics import innovations, score
+from benchmarks.metrics.families import families
 from benchmarks.metrics.metric import Better, Metric, Unit
 from fusion import ParameterError
 
 COST = Metric("cpu_per_measurement_s", "s/measurement", Better.LESS, "processor time per measurement", "none")
-METRICS: Mapping[str, Metric] = {
-    metric.id: metric
-    for table in (
-        position.METRICS,
-        intervals.METRICS,
-        relative_pose.METRICS,
-        drift.METRICS,
-        consistency.METRICS,
-        convergence.METRICS,
-        innovations.METRICS,
-        (COST,),
-    )
-    for metric in table
-}
-"""Every metric by id, in the order of the documentation."""
+METRICS: Mapping[str, Metric] = {metric.id: metric for metric in (*score.METRICS, *innovations.METRICS, COST)}
+"""Every metric of ours by id, in the order of the documentation."""
 RANKED_BY = "pos_p75"
+
+
+def row_of(metric: str) -> Metric | None:
+    """The row of a metric, of ours or of another distribution; None of one that has none."""
+    return METRICS.get(metric) or families().rows.get(metric)
 
 
 class Column(NamedTuple):
@@ -47,7 +40,8 @@ def unit_of(metric: str) -> Unit:
     >>> unit_of("pos_p75").number(0.123), unit_of("anees").number(1.234), unit_of("head_n").name
     ('12.3', '1.23', '')
     """
-    return METRICS[metric].unit if metric in METRICS else Unit("", 1.0, 2)
+    row = row_of(metric)
+    return Unit("", 1.0, 2) if row is None else row.unit
 
 
 def column(metric: str, title: str, *, decimals: int | None = None, separator: str = "\n") -> Column:
@@ -72,14 +66,15 @@ COLUMNS = (
 
 def more_is_better(metric: str) -> bool:
     """Whether the catalogue has the metric, and its greater values are better."""
-    return metric in METRICS and METRICS[metric].better is Better.MORE
+    row = row_of(metric)
+    return row is not None and row.better is Better.MORE
 
 
 def require_lower_is_better(metric: str) -> None:
     """Raises `ParameterError` for a metric of which more is better, or a certain value: that the lower wins would be
     the wrong verdict; and for one that may be below zero, for verdicts are on ratios.
     """
-    known = METRICS.get(metric)
+    known = row_of(metric)
     if known is not None and known.better is not Better.LESS:
         raise ParameterError(f"a lower {metric} is not better, so it decides nothing here; {RANKED_BY} is usual")
     if known is not None and known.signed:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from benchmarks.metrics import consistency, convergence, drift, intervals, position, relative_pose
 from benchmarks.metrics.consistency import CHI_SQUARE_95, Claimed, consistency_metrics, distribution_metrics
 from benchmarks.metrics.convergence import dynamic_metrics
 from benchmarks.metrics.drift import drift_metrics
@@ -25,8 +26,19 @@ from logs.truth import Instants
 METRICS_VERSION = 11
 """Changes whenever a metric does, so that stored scores are not taken for current ones."""
 
+METRICS = (
+    *position.METRICS,
+    *intervals.METRICS,
+    *relative_pose.METRICS,
+    *drift.METRICS,
+    *consistency.METRICS,
+    *convergence.METRICS,
+)
+"""The rows of `metrics`, and of what only the runner can add: while a fault lasts, without an answer."""
+
 __all__ = [
     "CHI_SQUARE_95",
+    "METRICS",
     "METRICS_VERSION",
     "Errors",
     "absolute_metrics",

@@ -14,6 +14,7 @@ import numpy as np
 import fusion
 from benchmarks.faults.fault import Fault
 from benchmarks.faults.inject import read_fault
+from benchmarks.metrics import families
 from benchmarks.metrics.score import METRICS_VERSION
 from benchmarks.runner.archive import ARCHIVE_VERSION
 from benchmarks.runner.fingerprint import fingerprint
@@ -69,8 +70,9 @@ def _cells(
     seeds: Sequence[int],
 ) -> list[Cell]:
     cells, rules = [], asdict(suite.evaluation)
+    foreign = {f"metrics {name}": fingerprint(module) for name, module in families.modules().items()}
     for run, content in zip(suite.runs, contents, strict=True):
-        judged = {"truth": content.truth, "evaluation": rules, "metrics": METRICS_VERSION}
+        judged = {"truth": content.truth, "evaluation": rules, "metrics": METRICS_VERSION, **foreign}
         for fault, estimator, seed in product(suite.faults, suite.estimators, seeds):
             spec = {**made[estimator.id], **run_identity(suite, run, fault, content, code[fault.id]), "seed": seed}
             key = key_of(spec)

@@ -13,10 +13,11 @@ from benchmarks.faults.fault import Fault
 from benchmarks.faults.inject import outages
 from benchmarks.metrics.convergence import fault_metrics
 from benchmarks.metrics.estimate_track import Track
+from benchmarks.metrics.families import all_metrics
 from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.innovations import innovation_metrics, nis_metrics
 from benchmarks.metrics.matching import availability, match, meet
-from benchmarks.metrics.score import Errors, errors, metrics, metrics_of_lost, unanswered
+from benchmarks.metrics.score import Errors, errors, metrics_of_lost, unanswered
 from benchmarks.runner.reference import Reference
 from benchmarks.runner.suite import Evaluation
 
@@ -121,5 +122,5 @@ def _left(
 
 
 def _metrics(measured: Errors, reference: Reference, faults: Sequence[Fault]) -> dict[str, float]:
-    found = metrics(measured)
+    found = all_metrics(measured)
     return found | fault_metrics(measured, reference.begin_ns, outages(faults)) if faults else found
