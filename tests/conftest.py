@@ -1,6 +1,8 @@
 """What holds for all tests."""
 
+import importlib
 import os
+import sys
 
 import pytest
 from hypothesis import settings
@@ -34,3 +36,22 @@ def stranger(tmp_path, monkeypatch):
     (about / "entry_points.txt").write_text(entries, encoding="utf-8")
     monkeypatch.syspath_prepend(site)
     return REMEDY
+
+
+@pytest.fixture
+def declare(tmp_path, monkeypatch):
+    """Puts a module ``visitor`` on the path, of a distribution `visitors` that declares ``name`` in ``group``."""
+    site = tmp_path / "visitors"
+    about = site / "visitors-1.dist-info"
+    about.mkdir(parents=True)
+    (about / "METADATA").write_text("Name: visitors\nVersion: 1\nSummary: Things brought along\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(site)
+
+    def put(group, name, value, code):
+        (site / "visitor.py").write_text(code, encoding="utf-8")
+        (about / "entry_points.txt").write_text(f"[{group}]\n{name} = {value}\n", encoding="utf-8")
+        monkeypatch.delitem(sys.modules, "visitor", raising=False)
+        importlib.invalidate_caches()
+
+    yield put
+    sys.modules.pop("visitor", None)

@@ -108,25 +108,6 @@ def test_plugin_that_is_no_estimator_is_listed_with_its_error(installed, capsys)
 # --- the doors, by a distribution on the path that declares one entry point -------------------------------------------
 
 
-@pytest.fixture
-def declare(tmp_path, monkeypatch):
-    """Puts a module ``visitor`` on the path, of a distribution `visitors` that declares ``name`` in ``group``."""
-    site = tmp_path / "visitors"
-    about = site / "visitors-1.dist-info"
-    about.mkdir(parents=True)
-    (about / "METADATA").write_text("Name: visitors\nVersion: 1\nSummary: Things brought along\n", encoding="utf-8")
-    monkeypatch.syspath_prepend(site)
-
-    def put(group, name, value, code):
-        (site / "visitor.py").write_text(code, encoding="utf-8")
-        (about / "entry_points.txt").write_text(f"[{group}]\n{name} = {value}\n", encoding="utf-8")
-        monkeypatch.delitem(sys.modules, "visitor", raising=False)
-        importlib.invalidate_caches()
-
-    yield put
-    sys.modules.pop("visitor", None)
-
-
 BROKEN = {
     "does not compile": ("def", "failed while being imported: SyntaxError"),
     "fails": ("1 / 0", "failed while being imported: ZeroDivisionError"),
