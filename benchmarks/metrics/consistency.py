@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.metrics.errors import Errors
 from benchmarks.metrics.metric import Better, rows
-from fusion.arrays import Flags, Floats, Whole
+from fusion.arrays import Flags, Floats
 from fusion.quantiles import known, mean
 
 CHI_SQUARE_95 = {1: 3.841458820694124, 2: 5.991464547107979, 3: 7.814727903251179}
@@ -32,17 +32,16 @@ class Claimed(NamedTuple):
     nees: Floats
     dimension: Floats
     hit: Flags
-    run: Whole
 
     @classmethod
     def of(cls, measured: Errors) -> Claimed:
-        """Those of all runs."""
+        """Those of the instants with a claim."""
         claimed = ~np.isnan(measured.nees)
-        nees, dimension, run = measured.nees, measured.dimension, measured.run
+        nees, dimension = measured.nees, measured.dimension
         if not claimed.all():
-            nees, dimension, run = nees[claimed], dimension[claimed], run[claimed]
+            nees, dimension = nees[claimed], dimension[claimed]
         hit = nees <= np.where(dimension == 3, CHI_SQUARE_95[3], CHI_SQUARE_95[2])
-        return cls(nees, dimension.astype(np.float64), hit, run)
+        return cls(nees, dimension.astype(np.float64), hit)
 
 
 def consistency_metrics(measured: Errors, claimed: Claimed) -> dict[str, float]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +28,6 @@ COVERED = 0.95
 FAULT = "fault with windows"
 METRICS = (
     *rows("t_conv", "s", Better.LESS, "time until the error stays below 1 m for 5 s"),
-    *rows("t_conv_share", "share", Better.MORE, "share of runs in which it does"),
     *rows("failures", "count", Better.LESS, "times that the error exceeds 3 m, or is missing, for 2 s"),
     *rows("t_recover", "s", Better.LESS, "of the worst of these, time until converged again"),
     *rows("max_in_outage", "m", Better.LESS, "of the worst of these, greatest error"),
@@ -63,11 +61,9 @@ class Stretches(NamedTuple):
 NONE = Stretches(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
 
 
-def stretches(mask: Flags, starts: Sequence[int] = (0,)) -> Stretches:
-    """The longest stretches of instants where ``mask`` (n,) is True, none reaching over ``starts`` of runs."""
-    changed = mask[1:] != mask[:-1]
-    changed[[start - 1 for start in starts[1:]]] = True
-    breaks = changed.nonzero()[0] + 1
+def stretches(mask: Flags) -> Stretches:
+    """The longest stretches of instants where ``mask`` (n,) is True."""
+    breaks = (mask[1:] != mask[:-1]).nonzero()[0] + 1
     if len(breaks) == 0:
         return Stretches(np.array([0]), np.array([len(mask) - 1])) if mask[:1].any() else NONE
     first = np.concatenate([[0], breaks])
@@ -82,37 +78,12 @@ def dynamic_metrics(measured: Errors) -> dict[str, float]:
 
 
 def convergence_metrics(measured: Errors) -> dict[str, float]:
-    """``t_conv`` [s] from the first instant of a run to when it has converged, ``t_conv_share`` of the runs that do.
-
-    Over several runs the Kaplan-Meier median; infinite when half of them never do before they end.
-    """
-    instants = measured.instants
-    near = stretches(measured.position <= CONVERGED_M, instants.starts)
-    held = near.lasting(instants.time_ns, CONVERGED_S).first.tolist()
-    times, reached = [], []
-    for start, beyond in pairwise((*instants.starts, len(instants))) if len(instants) else ():
-        own = [first for first in held if start <= first < beyond]
-        times.append(float(instants.time_ns[own[0] if own else beyond - 1] - instants.time_ns[start]) / NANOSECONDS)
-        reached.append(len(own) > 0)
-    share = sum(reached) / len(reached) if reached else math.nan
-    return {"t_conv": kaplan_meier_median(times, reached), "t_conv_share": share}
-
-
-def kaplan_meier_median(times: list[float], reached: list[bool]) -> float:
-    """The time by which half have reached their end, those not ``reached`` being watched only up to theirs.
-
-    Kaplan & Meier 1958; infinite when the estimated share left never falls to one half, NaN of nothing.
-    """
-    if not times:
-        return math.nan
-    left = 1.0
-    for time in sorted(set(times)):
-        watched = sum(other >= time for other in times)
-        ended = sum(done and other == time for other, done in zip(times, reached, strict=True))
-        left *= 1.0 - ended / watched
-        if left <= 0.5:
-            return time
-    return math.inf
+    """``t_conv`` [s] from the first instant to when it has converged; infinite if it never does, NaN of no instants."""
+    time_ns = measured.time_ns
+    if len(time_ns) == 0:
+        return {"t_conv": math.nan}
+    held = stretches(measured.position <= CONVERGED_M).lasting(time_ns, CONVERGED_S).first
+    return {"t_conv": float(time_ns[held[0]] - time_ns[0]) / NANOSECONDS if len(held) else math.inf}
 
 
 def failure_metrics(measured: Errors) -> dict[str, float]:
@@ -120,7 +91,7 @@ def failure_metrics(measured: Errors) -> dict[str, float]:
     if never; ``max_in_outage`` [m], the greatest error of a valid answer inside it; ``growth`` [m/s], the Theil-Sen
     slope of the error inside it. NaN where there was none.
     """
-    failed = stretches(measured.position > FAILED_M, measured.instants.starts).lasting(measured.time_ns, FAILED_S)
+    failed = stretches(measured.position > FAILED_M).lasting(measured.time_ns, FAILED_S)
     ends_ns = measured.time_ns[failed.last]
     spans = zip(failed.first.tolist(), (failed.last + 1).tolist(), ends_ns.tolist(), strict=True)
     return {"failures": float(len(failed.first)), **_worst([_outage(measured, *span) for span in spans])}
@@ -171,10 +142,9 @@ def _outage(measured: Errors, first: int, beyond: int, end_ns: int | None) -> Ou
 
 
 def _recovery_s(measured: Errors, beyond: int, end_ns: int) -> float:
-    """From ``end_ns`` until converged, sought from the instant ``beyond`` to the end of its run; infinite if never."""
-    rest = slice(beyond, measured.instants.end_of_run(beyond - 1))
-    rest_ns = measured.time_ns[rest]
-    held = stretches(measured.position[rest] <= CONVERGED_M).lasting(rest_ns, CONVERGED_S)
+    """From ``end_ns`` until converged, sought from the instant ``beyond`` on; infinite if never."""
+    rest_ns = measured.time_ns[beyond:]
+    held = stretches(measured.position[beyond:] <= CONVERGED_M).lasting(rest_ns, CONVERGED_S)
     return float(rest_ns[held.first[0]] - end_ns) / NANOSECONDS if len(held.first) else math.inf
 
 
@@ -187,7 +157,7 @@ def silence_metrics(measured: Errors) -> dict[str, float]:
     if count == 0:
         return dict.fromkeys(("age_p95", "dropouts", "dropout_s", "coverage"), math.nan)
     valid = np.isfinite(measured.position)
-    silent = stretches(~valid, measured.instants.starts)
+    silent = stretches(~valid)
     return {
         "age_p95": quantile(measured.age_s, 0.95),
         "dropouts": float(len(silent.first)),
@@ -197,8 +167,7 @@ def silence_metrics(measured: Errors) -> dict[str, float]:
 
 
 def _silence_s(measured: Errors, silent: Stretches) -> float:
-    after = np.minimum(silent.last + 1, len(measured.run) - 1)
-    after = np.where(measured.run[after] == measured.run[silent.last], after, silent.last)
+    after = np.minimum(silent.last + 1, len(measured.time_ns) - 1)
     return float((measured.time_ns[after] - measured.time_ns[silent.first]).sum()) / NANOSECONDS
 
 

@@ -20,25 +20,15 @@ BATCH = 1 << 16
 """Values transformed at once: more would cost memory and gain nothing."""
 
 
-def effective_sizes(series: Floats, run: Whole, leader: Whole | None = None) -> Floats:
-    """Effective sample size n / (1 + 2 sum of autocorrelations) of each row of ``series`` (k, n), summed over runs.
+def effective_sizes(series: Floats, leader: Whole | None = None) -> Floats:
+    """Effective sample size n / (1 + 2 sum of autocorrelations) of each row of ``series`` (k, n).
 
-    ``run`` (n,) numbers the runs whose values stand one after the other. The sum of autocorrelations is Geyer's
-    initial monotone sequence (Statistical Science 7(4), 1992, section 3.3); no size exceeds n. A row that never
-    changes within a run has none of its own and takes that of its ``leader`` (k,), None: the first row; if this is
-    constant as well, 1.
+    The sum of autocorrelations is Geyer's initial monotone sequence (Statistical Science 7(4), 1992, section 3.3); no
+    size exceeds n. A row that never changes has none of its own and takes that of its ``leader`` (k,), None: the first
+    row; if this is constant as well, 1.
     """
     if series.shape[1] == 0:
         return np.full(len(series), np.nan)
-    followed = np.zeros(len(series), dtype=np.int64) if leader is None else leader
-    if run[0] == run[-1]:
-        return _of_one_run(series, followed)
-    borders = np.flatnonzero(run[1:] != run[:-1]) + 1
-    parts = [_of_one_run(part, followed) for part in np.split(series, borders, axis=1)]
-    return np.asarray(np.sum(parts, axis=0), dtype=np.float64)
-
-
-def _of_one_run(series: Floats, leader: Whole) -> Floats:
     spans = np.maximum.reduce(series, axis=1) - np.minimum.reduce(series, axis=1)
     changing = np.flatnonzero(spans)
     sizes = np.ones(len(series))
@@ -47,7 +37,8 @@ def _of_one_run(series: Floats, leader: Whole) -> Floats:
         rows = changing[first : first + at_once]
         chosen = series if len(rows) == len(series) else series[rows]
         sizes[rows] = _of_rows(chosen / spans[rows, None])
-    return np.where(spans == 0.0, sizes[leader], sizes)
+    followed = np.zeros(len(series), dtype=np.int64) if leader is None else leader
+    return np.where(spans == 0.0, sizes[followed], sizes)
 
 
 def _of_rows(series: Floats) -> Floats:

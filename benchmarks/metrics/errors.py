@@ -1,8 +1,7 @@
-"""How far the answers were from the truth: the columns that every metric is computed from."""
+"""Errors of the answers against the truth: the columns that every metric is computed from."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +13,9 @@ from logs.truth import Instants, wrap_angles
 
 
 class Errors(NamedTuple):
-    """Errors at the evaluation instants, all (n,): what every metric is computed from, and what runs are pooled by.
+    """Errors at the evaluation instants, all (n,): what every metric is computed from.
 
-    ``instants``: the truth, of one run or of several that were pooled. ``position`` [m]: infinite without a valid
+    ``instants``: the truth. ``position`` [m]: infinite without a valid
     answer. ``heading`` [rad], absolute: NaN where the truth has none, infinite where only the answer has none.
     ``nees``: squared Mahalanobis distance of the error, over ``dimension`` 3, or 2 where a heading is missing;
     ``nees_2d`` of the position alone; both NaN where no covariance was claimed.
@@ -46,11 +45,6 @@ class Errors(NamedTuple):
     def time_ns(self) -> Whole:
         """When each instant was."""
         return self.instants.time_ns
-
-    @property
-    def run(self) -> Whole:
-        """The number of its run; within each, time rises."""
-        return self.instants.run
 
 
 def errors(instants: Instants, answers: Answers, weight: Floats | None = None) -> Errors:
@@ -84,16 +78,3 @@ def errors(instants: Instants, answers: Answers, weight: Floats | None = None) -
         since_fix_s=answers.since_fix_s,
         weight=weight,
     )
-
-
-def pool(parts: Sequence[Errors]) -> Errors:
-    """All instants of all parts together, each part a run of its own."""
-    weighed = any(part.weight is not None for part in parts)
-    columns = [part._replace(weight=_weight(part))[1:] for part in parts]
-    instants = Instants.together([part.instants for part in parts])
-    together = Errors(instants, *(np.concatenate(column) for column in zip(*columns, strict=True)))
-    return together if weighed else together._replace(weight=None)
-
-
-def _weight(part: Errors) -> Floats:
-    return np.ones(len(part.position)) if part.weight is None else part.weight

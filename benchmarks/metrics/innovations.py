@@ -78,8 +78,9 @@ def mean_nis(fates: FateColumns) -> dict[str, Banded]:
         own = np.flatnonzero(known & (fates.kind == kind))
         if len(own):
             own = own[np.argsort(fates.source[own], kind="stable")]
-            nis = np.minimum(fates.nis[own], CEILING)
-            (samples,) = effective_sizes(nis[None], fates.source[own].astype(np.int64)).tolist()
+            nis, source = np.minimum(fates.nis[own], CEILING), fates.source[own]
+            of_each_anchor = np.split(nis, np.flatnonzero(source[1:] != source[:-1]) + 1)
+            samples = sum(float(effective_sizes(one[None])[0]) for one in of_each_anchor)
             found[name] = Banded(mean(nis), *mean_chi_square_band(1.0, samples))
     return found
 

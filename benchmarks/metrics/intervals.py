@@ -49,7 +49,7 @@ def interval_metrics(measured: Errors, ordered: Ordered, claimed: Claimed) -> di
     series = np.empty((len(LEADERS), len(measured.position)))
     _below(measured.position, ordered, series[:QUANTILE_ROWS])
     _hits(claimed, series[QUANTILE_ROWS:])
-    sizes = effective_sizes(series, measured.run, LEADERS).tolist()
+    sizes = effective_sizes(series, LEADERS).tolist()
     return {**_of_quantiles(ordered, sizes[:QUANTILE_ROWS]), **_of_claims(claimed, sizes[QUANTILE_ROWS:])}
 
 
@@ -60,7 +60,7 @@ def quantile_intervals(measured: Errors, ordered: Ordered) -> dict[str, float]:
     """
     series = np.empty((QUANTILE_ROWS, len(measured.position)))
     _below(measured.position, ordered, series)
-    return _of_quantiles(ordered, effective_sizes(series, measured.run).tolist())
+    return _of_quantiles(ordered, effective_sizes(series).tolist())
 
 
 def claim_intervals(claimed: Claimed) -> dict[str, float]:
@@ -70,7 +70,7 @@ def claim_intervals(claimed: Claimed) -> dict[str, float]:
     """
     series = np.empty((2, len(claimed.nees)))
     _hits(claimed, series)
-    return _of_claims(claimed, effective_sizes(series, claimed.run).tolist())
+    return _of_claims(claimed, effective_sizes(series).tolist())
 
 
 def _below(position: Floats, ordered: Ordered, series: Floats) -> None:

@@ -115,9 +115,9 @@ def relative_errors(poses: Poses, start: slice | Whole, end: slice | Whole) -> t
 
 def velocity_metrics(poses: Poses) -> dict[str, float]:
     """Size of the difference between the mean velocities over 1 s of answers and truth [m/s]: mean and p95."""
-    clock_ns, (start, end) = poses.instants.clock_ns, poses.instants.pairs["t_1s"]
+    time_ns, (start, end) = poses.instants.time_ns, poses.instants.pairs["t_1s"]
     gained = np.abs(poses.error[end] - poses.error[start])
-    speed = gained / ((clock_ns[end] - clock_ns[start]) / NANOSECONDS)
+    speed = gained / ((time_ns[end] - time_ns[start]) / NANOSECONDS)
     told = known(speed)
     return {"vel_err": mean(told), "vel_err_p95": quantile(told, 0.95)}
 
@@ -128,11 +128,11 @@ def step_metrics(poses: Poses, age_s: Floats, top_speed_m_s: float = TOP_SPEED_M
     A jump is a step longer than ``top_speed_m_s`` allows in the time between the stamps of both answers, which are
     ``age_s`` (n,) old, plus 0.10 m.
     """
-    true, clock_ns = poses.instants.points, poses.instants.clock_ns
+    true, time_ns = poses.instants.points, poses.instants.time_ns
     step = np.abs(true[1:] - true[:-1] + (poses.error[1:] - poses.error[:-1]))
-    seconds = (clock_ns[1:] - clock_ns[:-1]) / NANOSECONDS
+    seconds = (time_ns[1:] - time_ns[:-1]) / NANOSECONDS
     known_s = np.where(np.isfinite(age_s), age_s, 0.0)
-    both = np.isfinite(step) & poses.instants.joined
+    both = np.isfinite(step)
     jumps = both & (step > top_speed_m_s * (seconds - (known_s[1:] - known_s[:-1])) + JUMP_M)
     columns = (seconds / 60.0, step, poses.instants.step_m)
     minutes, said_m, true_m = (float(np.add.reduce(column, where=both)) for column in columns)

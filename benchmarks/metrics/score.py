@@ -14,7 +14,7 @@ from benchmarks.metrics import consistency, convergence, drift, intervals, posit
 from benchmarks.metrics.consistency import CHI_SQUARE_95, Claimed, consistency_metrics, distribution_metrics
 from benchmarks.metrics.convergence import dynamic_metrics
 from benchmarks.metrics.drift import drift_metrics
-from benchmarks.metrics.errors import Errors, errors, pool
+from benchmarks.metrics.errors import Errors, errors
 from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.intervals import interval_metrics, quantile_intervals
 from benchmarks.metrics.matching import match
@@ -23,7 +23,7 @@ from benchmarks.metrics.relative_pose import trajectory_metrics
 from fusion.quantiles import Ordered, quantile
 from logs.truth import Instants
 
-METRICS_VERSION = 11
+METRICS_VERSION = 12
 """Changes whenever a metric does, so that stored scores are not taken for current ones."""
 
 METRICS = (
@@ -46,7 +46,6 @@ __all__ = [
     "for_json",
     "metrics",
     "metrics_of_lost",
-    "pool",
     "quantile",
     "unanswered",
 ]

@@ -27,7 +27,6 @@ BANDS = {
     (3, 100): (0.8464, 1.1662),
     (3, 1000): (0.9500, 1.0512),
 }
-ONE_RUN = np.zeros(100_000, dtype=np.int64)
 
 
 def correlated(r, rho, n):
@@ -51,26 +50,25 @@ def test_gates_are_those_of_the_tables():
 @pytest.mark.parametrize("rho", [0.5, 0.9])
 def test_effective_size_of_an_autoregressive_series_is_as_in_theory(rho):
     series = correlated(np.random.default_rng(1), rho, 100_000)
-    (size,) = effective_sizes(series[None], ONE_RUN)
+    (size,) = effective_sizes(series[None])
     assert size == pytest.approx(100_000 * (1.0 - rho) / (1.0 + rho), rel=0.06)
 
 
 def test_white_noise_counts_fully_and_never_more():
     r = np.random.default_rng(2)
     white = r.normal(size=100_000)
-    sizes = effective_sizes(np.array([white, np.tile([1.0, -1.0], 50_000)]), ONE_RUN)
+    sizes = effective_sizes(np.array([white, np.tile([1.0, -1.0], 50_000)]))
     assert 95_000 < sizes[0] <= 100_000
     assert sizes[1] == 100_000
 
 
 def test_series_that_never_changes_takes_the_size_of_the_first_or_one():
     changing, constant = np.sin(np.arange(50.0)), np.ones(50)
-    run = ONE_RUN[:50]
-    first, second = effective_sizes(np.array([changing, constant]), run)
+    first, second = effective_sizes(np.array([changing, constant]))
     assert second == first
-    assert effective_sizes(constant[None], run).tolist() == [1.0]
-    assert effective_sizes(np.ones((2, 1)), run[:1]).tolist() == [1.0, 1.0]
-    assert np.isnan(effective_sizes(np.ones((2, 0)), run[:0])).all()
+    assert effective_sizes(constant[None]).tolist() == [1.0]
+    assert effective_sizes(np.ones((2, 1))).tolist() == [1.0, 1.0]
+    assert np.isnan(effective_sizes(np.ones((2, 0)))).all()
 
 
 def test_intervals_with_effective_size_hold_what_they_promise(instants_of, answers_of):
@@ -85,7 +83,7 @@ def test_intervals_with_effective_size_hold_what_they_promise(instants_of, answe
         scores = quantile_intervals(measured, Ordered.of(measured.position))
         quantile += scores["pos_p75_low"] <= p75 <= scores["pos_p75_high"]
         hit = error < 1.0
-        (size,) = effective_sizes(hit[None].astype(float), np.zeros(1500, dtype=np.int64))
+        (size,) = effective_sizes(hit[None].astype(float))
         low, high = binomial_interval(hit.mean(), size)
         cover += low <= 2.0 * stats.norm.cdf(1.0) - 1.0 <= high
     assert 0.91 <= cover / trials <= 0.98
@@ -220,7 +218,7 @@ def test_series_that_never_changes_follows_its_own_leader():
     r = np.random.default_rng(6)
     white, slow, constant = r.normal(size=1000), np.cumsum(r.normal(size=1000)), np.ones(1000)
     series = np.array([white, constant, slow, constant])
-    first, second, third, fourth = effective_sizes(series, ONE_RUN[:1000], np.array([0, 0, 2, 2]))
+    first, second, third, fourth = effective_sizes(series, np.array([0, 0, 2, 2]))
     assert first == second != third == fourth
 
 

@@ -9,12 +9,11 @@ from benchmarks.metrics.convergence import (
     convergence_metrics,
     failure_metrics,
     fault_metrics,
-    kaplan_meier_median,
     silence_metrics,
     stretches,
 )
 from benchmarks.metrics.drift import MOST_PAIRS, drift_metrics, pairs_of, theil_sen
-from benchmarks.metrics.errors import errors, pool
+from benchmarks.metrics.errors import errors
 
 
 @pytest.fixture
@@ -32,38 +31,23 @@ def off_by(instants_of, answers_of):
     return measured
 
 
-def test_stretches_end_where_a_run_ends():
-    mask = np.array([True, True, False, True, True, True])
-    found = stretches(mask, (0, 4))
-    assert found.first.tolist() == [0, 3, 4]
-    assert found.last.tolist() == [1, 3, 5]
-    assert len(stretches(mask & False).first) == 0
+def test_stretches_are_the_longest():
+    found = stretches(np.array([True, True, False, True, True, True]))
+    assert (found.first.tolist(), found.last.tolist()) == ([0, 3], [1, 5])
+    assert len(stretches(np.zeros(6, dtype=bool)).first) == 0
 
 
 def test_convergence_is_the_first_time_below_a_metre_for_five_seconds(off_by):
     position = np.full(200, 2.0)
     position[10:40] = 0.5
     position[100:] = 0.5
-    assert convergence_metrics(off_by(position)) == {"t_conv": 10.0, "t_conv_share": 1.0}
+    assert convergence_metrics(off_by(position)) == {"t_conv": 10.0}
 
 
 def test_run_that_ends_before_five_seconds_are_over_has_not_converged(off_by):
     position = np.full(100, 2.0)
     position[51:] = 0.5
-    assert convergence_metrics(off_by(position)) == {"t_conv": math.inf, "t_conv_share": 0.0}
-
-
-def test_convergence_over_runs_is_the_median_of_kaplan_and_meier(off_by):
-    runs = [np.concatenate([np.full(k, 2.0), np.full(60, 0.1)]) for k in (10, 20, 40)] + [np.full(15, 2.0)]
-    scores = convergence_metrics(pool([off_by(position) for position in runs]))
-    # After 1.0 s three of four are left, after 2.0 s half of those: the run censored at 1.4 s counts no more.
-    assert scores == {"t_conv": 2.0, "t_conv_share": 0.75}
-
-
-def test_kaplan_meier_median_without_an_end_is_infinite():
-    assert kaplan_meier_median([1.0, 2.0], [False, False]) == math.inf
-    assert kaplan_meier_median([1.0, 2.0, 3.0], [True, True, True]) == 2.0
-    assert math.isnan(kaplan_meier_median([], []))
+    assert convergence_metrics(off_by(position)) == {"t_conv": math.inf}
 
 
 def test_failure_is_told_with_its_peak_growth_and_recovery(off_by):
@@ -90,12 +74,6 @@ def test_silence_is_a_failure_that_has_no_peak(off_by):
     assert scores["failures"] == 1.0
     assert scores["t_recover"] == math.inf
     assert math.isnan(scores["max_in_outage"])
-
-
-def test_recovery_is_sought_in_the_same_run_only(off_by):
-    fails, good = off_by(np.full(100, 5.0)), off_by(np.full(100, 0.1))
-    assert failure_metrics(pool([fails, good]))["t_recover"] == math.inf
-    assert failure_metrics(pool([good, fails, good]))["t_recover"] == math.inf
 
 
 FAULT_IDS = ("fault_availability", "fault_t_recover", "fault_max_in_outage", "fault_growth")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.matching import match
-from benchmarks.metrics.score import errors, for_json, metrics, pool, quantile
+from benchmarks.metrics.score import errors, for_json, metrics, quantile
 from fusion import Covariance, Estimate, Odometry, Pose, Update, wrap_angle
 from logs.truth import Instants, TruthTrack, evaluation_instants
 
@@ -107,7 +107,6 @@ ORACLE_A = {
     "coverage": 1.0,
     "failures": 0.0,
     "t_conv": 0.0,
-    "t_conv_share": 1.0,
 }
 
 
@@ -207,27 +206,6 @@ def test_quantile_is_numpys_on_finite_values():
         assert quantile(values, share) == pytest.approx(np.quantile(values, share), rel=1e-12)
 
 
-def test_pooling_weighs_every_instant_alike():
-    def run_of(*position):
-        n = len(position)
-        truth = TruthTrack(np.arange(n) * 10 * STEP_NS, np.zeros(n), np.zeros(n), np.zeros(n))
-        said = [
-            Update(
-                Odometry(k * 10 * STEP_NS, "wheels", k, k * 10 * STEP_NS - 1, 0.0, 0.0),
-                Estimate(k * 10 * STEP_NS, Pose(x, 0.0, 0.0), None, valid=math.isfinite(x)),
-                (),
-            )
-            for k, x in enumerate(position)
-        ]
-        instants = evaluation_instants(truth)
-        return errors(instants, match(instants, Track.of(said)))
-
-    both = metrics(pool([run_of(1.0), run_of(3.0, math.inf, 3.0)]))
-    assert both["n"] == 4.0
-    assert both["pos_mean"] == pytest.approx(7.0 / 3.0)
-    assert both["availability"] == 0.75
-
-
 def test_scores_of_no_instants_are_not_numbers():
     nothing = np.array([])
     instants = Instants(nothing.astype(np.int64), nothing, nothing, nothing)
@@ -235,18 +213,6 @@ def test_scores_of_no_instants_are_not_numbers():
     counts = {"n", "n_valid", "failures", *(name for name in scores if name.endswith("_n"))}
     assert all(scores[name] == 0.0 for name in counts)
     assert all(math.isnan(scores[name]) for name in set(scores) - counts)
-
-
-def test_pooled_runs_keep_their_trajectories_apart(oracle_a):
-    one = errors(*oracle_a)
-    alone, both = metrics(one), metrics(pool([one, one]))
-    same = [name for name in alone if name.startswith(("pos_p", "rpe", "vel", "jump", "path", "t_conv", "cover"))]
-    for name in [name for name in same if not name.endswith(("_n", "_low", "_high", "n_eff", "median", "p95"))]:
-        assert both[name] == pytest.approx(alone[name], rel=1e-3), name
-    assert both["rpe_t_1s_n"] == 2.0 * alone["rpe_t_1s_n"]
-    assert both["rpe_d_10m_n"] == 2.0 * alone["rpe_d_10m_n"]
-    assert both["n_eff"] == pytest.approx(2.0 * alone["n_eff"], rel=1e-6)
-    assert pool([pool([one, one]), one]).run[[0, 1000, 2000]].tolist() == [0, 1, 2]
 
 
 AXES = ("abs_", "bias_", "cov_", "coverage")

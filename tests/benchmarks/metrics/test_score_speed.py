@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics import effective_samples as samples
-from benchmarks.metrics.errors import errors, pool
+from benchmarks.metrics.errors import errors
 from benchmarks.metrics.score import metrics
 from logs import truth as course
 
@@ -50,12 +50,6 @@ def test_long_series_are_transformed_a_few_at_a_time_to_spare_memory(instants_of
     instants = instants_of(0.1 * np.arange(40_000), *np.zeros((3, 40_000)))
     metrics(errors(instants, answers_of(*noise, np.eye(3))))
     assert transforms == [(1, 40_000)] * 8
-
-
-def test_runs_that_are_pooled_are_transformed_one_by_one(oracle_a, transforms):
-    measured = errors(*oracle_a)
-    metrics(pool([measured, measured]))
-    assert transforms == [(8, 1000)] * 2
 
 
 def test_cost_of_a_pair_is_told_by_kinds_of_metrics():
