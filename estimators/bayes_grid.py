@@ -23,14 +23,14 @@ from fusion import (
     Pose,
     Prior,
     Radio,
-    Sighting,
+    RadioReading,
     Tag,
     World,
     compose,
-    sightings,
+    radio_readings,
 )
 from fusion.belief import HEADING_KNOWN_STD
-from fusion.correlated_error import repeated_variance, require_most_alike
+from fusion.correlated_error import repeated_variance, require_max_correlated
 from fusion.fates import judged
 from fusion.weighted_points import Array, carried, mixture, moments
 
@@ -58,10 +58,10 @@ class BayesGrid:
         How many heading bins a full turn has.
     outlier_share
         Share of readings expected to be outliers, in (0, 1).
-    most_alike
+    max_correlated
         How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
         takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
-        20 where the world tells its `shadowing_length_m`, else 3.
+        20 where the world states its `shadowing_length_m`, else 3.
     """
 
     summary: ClassVar[str] = "histogram Bayes filter over floor and heading; starts from anywhere"
@@ -74,7 +74,7 @@ class BayesGrid:
         cells: int = 1600,
         headings: int = 24,
         outlier_share: float = 0.05,
-        most_alike: float | None = None,
+        max_correlated: float | None = None,
     ) -> None:
         if cells < 4 or headings < 4:
             raise ParameterError(f"bayes_grid: cells is {cells}, headings {headings}; give at least 4 of each")
@@ -82,7 +82,7 @@ class BayesGrid:
             raise ParameterError(f"bayes_grid: outlier_share is {outlier_share}; give a share between 0 and 1")
         self._world = world
         self._outlier_share = outlier_share
-        self._most_alike = require_most_alike("bayes_grid", most_alike)
+        self._max_correlated = require_max_correlated("bayes_grid", max_correlated)
         bounds = world.bounds
         width, depth = bounds.x_max - bounds.x_min, bounds.y_max - bounds.y_min
         self._cell_m = math.sqrt(width * depth / cells)
@@ -136,10 +136,10 @@ class BayesGrid:
         """The state after the readings of a scan."""
         pose, covariance = compose(state.pose, state.covariance, state.pending)
         histogram, fates = state.histogram, []
-        for sighting in sightings(self._world, scan):
-            likelihood, good = self._likelihood(sighting, state.pending, state.path_m)
+        for reading in radio_readings(self._world, scan):
+            likelihood, good = self._likelihood(reading, state.pending, state.path_m)
             share = min(float(np.sum(state.histogram * good)), 1.0)
-            fates.append(judged(scan, sighting, pose, covariance, self._world.robot.antenna_m, share))
+            fates.append(judged(scan, reading, pose, covariance, self._world.robot.antenna_m, share))
             histogram = histogram * likelihood
             histogram = histogram / histogram.sum()
         return self._state(histogram, state.pending), tuple(fates)
@@ -149,17 +149,17 @@ class BayesGrid:
         noise = max(spread.xx, spread.yy) > (0.5 * self._cell_m) ** 2 or spread.hh > (0.5 * self._bin_rad) ** 2
         return noise or math.hypot(motion.x, motion.y) >= self._cell_m or abs(motion.heading) >= self._bin_rad
 
-    def _likelihood(self, sighting: Sighting, motion: Increment, path_m: float) -> tuple[Array, Array]:
+    def _likelihood(self, reading: RadioReading, motion: Increment, path_m: float) -> tuple[Array, Array]:
         """The mixture in every cell, moved by ``motion``, of a reading ``path_m`` after the one before; the reading's
         variance includes its spread within a cell.
         """
         x, y = carried(self._x, self._y, self._heading, motion)
-        expected = sighting.expected_values(x, y, self._heading + motion.heading, self._world.robot.antenna_m)
+        expected = reading.expected_values(x, y, self._heading + motion.heading, self._world.robot.antenna_m)
         # One heading's floor shows the spread within a cell well enough for all.
         by_x, by_y = np.gradient(expected[0])
-        spread = repeated_variance(sighting, path_m, self._most_alike)
+        spread = repeated_variance(reading, path_m, self._max_correlated)
         variance = spread + (by_x * by_x + by_y * by_y) / 12.0
-        return mixture(sighting.value - expected, variance, self._outlier_share)
+        return mixture(reading.value - expected, variance, self._outlier_share)
 
     def _moved(self, histogram: Array, motion: Increment) -> Array:
         """The histogram after ``motion``: each heading's floor is shifted and blurred along x and y, then the heading

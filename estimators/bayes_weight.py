@@ -31,7 +31,7 @@ from fusion import (
     Tag,
     World,
     compose,
-    sightings,
+    radio_readings,
     wrap_angle,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
@@ -91,7 +91,7 @@ class BayesWeight:
         pose, covariance = compose(state.pose, state.covariance, motion)
         if scan is None:
             return state._replace(pose=pose, covariance=covariance), ()
-        seen = sightings(self._world, scan)
+        seen = radio_readings(self._world, scan)
         recent = remember(state.recent, scan.time_ns, seen, self._window_ns)
         fix = fix_from(recent, self._world.robot)
         if isinstance(fix, Reason):

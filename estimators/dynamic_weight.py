@@ -18,11 +18,11 @@ from fusion import (
     Pose,
     Prior,
     Radio,
+    RadioReading,
     Reason,
-    Sighting,
     Tag,
     World,
-    sightings,
+    radio_readings,
     wrap_angle,
 )
 from fusion.belief import starting_belief
@@ -133,7 +133,7 @@ class DynamicWeight:
         state = self._moved(state, motion)
         if scan is None:
             return state, ()
-        seen = sightings(self._world, scan)
+        seen = radio_readings(self._world, scan)
         recent = remember(state.recent, scan.time_ns, seen, self._window_ns)
         fix = fix_from(recent, self._world.robot)  # Algorithm 1, line 4
         if isinstance(fix, Reason):
@@ -159,7 +159,7 @@ class DynamicWeight:
         return fix.x - arm_x, fix.y - arm_y
 
     def _fuse(
-        self, state: State, fix: tuple[float, float], scan: Radio, seen: tuple[Sighting, ...]
+        self, state: State, fix: tuple[float, float], scan: Radio, seen: tuple[RadioReading, ...]
     ) -> tuple[State, tuple[Fate, ...]]:
         """Algorithm 1, lines 5 and 6. From an unknown position, odometry starts at the first fix."""
         expected = (state.odometry, None) if state.position_known else None

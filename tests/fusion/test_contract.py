@@ -39,7 +39,7 @@ from fusion import (
     digest,
     final,
     generator,
-    sightings,
+    radio_readings,
     track,
     wrap_angle,
 )
@@ -145,17 +145,17 @@ def test_derivatives_of_a_sighting_are_those_of_finite_differences(model, x, y, 
         if model == "radio"
         else Ranges(0, "r", 0, (RangeReading("a", 3.0),))
     )
-    (sighting,) = sightings(place, scan)
+    (reading,) = radio_readings(place, scan)
     antenna = place.robot.antenna_m
-    here, step = sighting.expect(x, y, heading, antenna), 1e-6
+    here, step = reading.expect(x, y, heading, antenna), 1e-6
     if math.hypot(x, y) < 2.0:
         return
     for index, analytic in enumerate((here.by_x, here.by_y, here.by_heading)):
         moved = [x, y, heading]
         moved[index] += step
-        ahead = sighting.expect(*moved, antenna).value
+        ahead = reading.expect(*moved, antenna).value
         moved[index] -= 2 * step
-        numeric = (ahead - sighting.expect(*moved, antenna).value) / (2 * step)
+        numeric = (ahead - reading.expect(*moved, antenna).value) / (2 * step)
         assert analytic == pytest.approx(numeric, abs=1e-5)
 
 
