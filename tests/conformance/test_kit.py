@@ -29,8 +29,7 @@ from fusion import (
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.cli import check as verb
 from fusion.cli.main import main
-from fusion.conformance.checks import Check, Outcome, _verdict, checks, run_checks
-from fusion.conformance.estimator_promises import PROMISES
+from fusion.conformance.checks import PROMISES, Check, Outcome, _verdict, checks, run_checks
 
 
 class State(NamedTuple):
@@ -366,7 +365,7 @@ BROKEN = {
     OrderOfNames: "names-mean-nothing",
     NoGate: "outlier-is-bounded",
     Backwards: "forward-is-forward",
-    ConstantCovariance: "silence-is-told",
+    ConstantCovariance: "radio-silence",
     GuessesByTheBits: "rate-means-nothing",
     NoisePerStep: "closing-changes-little",
     ForgetsClosedStretches: "closing-changes-little",
