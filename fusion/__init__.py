@@ -50,6 +50,7 @@ from fusion.geometry import Covariance, Pose, wrap_angle
 from fusion.motion import Increment, Move, compose, move
 from fusion.plugins import available, build, built_in_names, load, names, registered
 from fusion.radio_reading import RadioReading, radio_readings
+from fusion.robot import OdometryNoise, Robot
 from fusion.timeline import Moment, Timeline
 from fusion.tracker import Tracker, final, track
 from fusion.values import (
@@ -70,7 +71,7 @@ from fusion.values import (
     WheelTicks,
     WifiScan,
 )
-from fusion.world import Anchor, Bounds, OdometryNoise, Robot, World
+from fusion.world import Anchor, Bounds, World
 
 __version__ = "0.1.0"
 

@@ -9,8 +9,8 @@ import numpy as np
 from fusion.correlated_error import total_variance
 from fusion.geometry import Covariance, Pose
 from fusion.radio_reading import RadioReading
+from fusion.robot import Robot
 from fusion.values import Decision, Fate, Measurement, Radio, Ranges, Reason, WifiScan
-from fusion.world import Robot
 
 
 def fate(measurement: Measurement, anchor: str, decision: Decision, reason: Reason) -> Fate:

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fusion.geometry import Covariance, Pose, wrap_angle
+from fusion.robot import OdometryNoise
 from fusion.values import Odometry, seconds
-from fusion.world import OdometryNoise
 
 Number = TypeVar("Number", float, NDArray[np.float64])
 NO_NOISE = Covariance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from fusion.geometry import Pose
 from fusion.radio_reading import RadioReading
+from fusion.robot import Robot
 from fusion.trilateration import Fix, are_collinear, trilaterate
 from fusion.values import Reason
-from fusion.world import Robot
 
 MINIMUM_ANCHORS = 3
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 
 Array = NDArray[np.float64]
+RadioKind = Literal["rssi", "range"]
+"""Signal strengths in dBm, or ranges in metres."""
 
 
 def free_space_loss_db(distance_m: float, frequency_hz: float) -> float:

@@ -47,9 +47,9 @@ from fusion.cli.main import main
 from fusion.conformance.synthetic_run import Drive
 from fusion.odometry import Odometer, wheel_increment
 from fusion.radio import PathLoss, Ranging, free_space_loss_db
+from fusion.robot import Robot
 from fusion.trilateration import closed_form, least_squares, trilaterate
 from fusion.values import nanoseconds
-from fusion.world import Robot
 
 SECOND = 1_000_000_000
 ANCHORS = [
