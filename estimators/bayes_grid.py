@@ -29,10 +29,11 @@ from fusion import (
     compose,
     radio_readings,
 )
+from fusion.arrays import Floats
 from fusion.belief import HEADING_KNOWN_STD
 from fusion.correlated_error import repeated_variance, require_max_correlated
 from fusion.fates import judged
-from fusion.weighted_points import Array, carried, mixture, moments
+from fusion.weighted_points import carried, mixture, moments
 
 
 class State(NamedTuple):
@@ -40,7 +41,7 @@ class State(NamedTuple):
     the path driven since the last scan.
     """
 
-    histogram: Array
+    histogram: Floats
     pose: Pose
     covariance: Covariance
     pending: Increment
@@ -124,7 +125,7 @@ class BayesGrid:
         every = [np.broadcast_to(place, state.histogram.shape).ravel() for place in places]
         return Particles(np.column_stack(every), state.histogram.ravel())
 
-    def _state(self, histogram: Array, pending: Increment) -> State:
+    def _state(self, histogram: Floats, pending: Increment) -> State:
         """A state of normalised probabilities; within its cell a pose is uniform, hence the twelfths."""
         histogram = histogram / histogram.sum()
         pose, between = moments(histogram, self._x, self._y, self._heading)
@@ -149,7 +150,7 @@ class BayesGrid:
         noise = max(spread.xx, spread.yy) > (0.5 * self._cell_m) ** 2 or spread.hh > (0.5 * self._bin_rad) ** 2
         return noise or math.hypot(motion.x, motion.y) >= self._cell_m or abs(motion.heading) >= self._bin_rad
 
-    def _likelihood(self, reading: RadioReading, motion: Increment, path_m: float) -> tuple[Array, Array]:
+    def _likelihood(self, reading: RadioReading, motion: Increment, path_m: float) -> tuple[Floats, Floats]:
         """The mixture in every cell, moved by ``motion``, of a reading ``path_m`` after the one before; the reading's
         variance includes its spread within a cell.
         """
@@ -161,7 +162,7 @@ class BayesGrid:
         variance = spread + (by_x * by_x + by_y * by_y) / 12.0
         return mixture(reading.value - expected, variance, self._outlier_share)
 
-    def _moved(self, histogram: Array, motion: Increment) -> Array:
+    def _moved(self, histogram: Floats, motion: Increment) -> Floats:
         """The histogram after ``motion``: each heading's floor is shifted and blurred along x and y, then the heading
         itself. What leaves the floor stays at its edge.
         """
@@ -180,12 +181,12 @@ class BayesGrid:
         return np.maximum(np.tensordot(turned, floors, axes=1), 0.0)
 
 
-def wrapped(angle: Array) -> Array:
+def wrapped(angle: Floats) -> Floats:
     """Angles [rad] brought into [-pi, pi)."""
     return np.asarray(np.remainder(angle + math.pi, math.tau) - math.pi)
 
 
-def shift_weights(distance: Array, mean: Array | float, variance: Array | float) -> Array:
+def shift_weights(distance: Floats, mean: Floats | float, variance: Floats | float) -> Floats:
     """Weight of moving by ``distance`` cells when the motion is normal and probability is shared linearly between
     the two nearest cells: the second difference of E[max(u - N, 0)]. Its mean is ``mean`` exactly.
     """
@@ -193,7 +194,7 @@ def shift_weights(distance: Array, mean: Array | float, variance: Array | float)
 
     std = np.sqrt(np.maximum(variance, 1e-6))
 
-    def ramp(u: Array) -> Array:
+    def ramp(u: Floats) -> Floats:
         density = np.exp(-0.5 * np.square(u / std)) / math.sqrt(math.tau)
         return np.asarray(u * ndtr(u / std) + std * density)
 
@@ -201,7 +202,7 @@ def shift_weights(distance: Array, mean: Array | float, variance: Array | float)
     return np.maximum(ramp(u + 1.0) - 2.0 * ramp(u) + ramp(u - 1.0), 0.0)
 
 
-def floor_kernel(mean: Array, variance: Array, size: int) -> Array:
+def floor_kernel(mean: Floats, variance: Floats, size: int) -> Floats:
     """Matrices (headings, to, from) that move probability along one axis by ``mean`` cells."""
     distance = np.arange(1.0 - size, size)
     weights = shift_weights(distance[None, :], mean[:, None], variance[:, None])
@@ -212,7 +213,7 @@ def floor_kernel(mean: Array, variance: Array, size: int) -> Array:
     return kernel
 
 
-def turn_kernel(mean: float, variance: float, size: int) -> Array:
+def turn_kernel(mean: float, variance: float, size: int) -> Floats:
     """The circular matrix (to, from) that turns probability by ``mean`` bins."""
     turns = np.arange(size) - mean
     # Three turns either way hold all the probability unless the heading is lost, and then any share is as good.

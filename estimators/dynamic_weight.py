@@ -23,11 +23,12 @@ from fusion import (
     Tag,
     World,
     radio_readings,
+    unusable,
     wrap_angle,
 )
 from fusion.belief import starting_belief
 from fusion.errors import did_you_mean
-from fusion.fates import fix_fates, unusable
+from fusion.fates import fix_fates
 from fusion.position_fix import Recent, fix_from, remember
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds

@@ -33,9 +33,10 @@ from fusion import (
     World,
     compose,
     radio_readings,
+    unusable,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.fates import fix_fates, unusable
+from fusion.fates import fix_fates
 from fusion.position_fix import Recent, fix_from, fix_innovation, remember
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds

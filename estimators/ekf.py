@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fusion import (
     Covariance,
@@ -34,12 +33,12 @@ from fusion import (
     radio_readings,
     wrap_angle,
 )
+from fusion.arrays import Floats
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.correlated_error import correlated_count_of, require_max_correlated
 from fusion.fates import chi_square_gate
 from fusion.radio import PathLoss, Ranging
 
-Array = NDArray[np.float64]
 POSE, CALIBRATION = slice(0, 3), slice(3, 6)
 HEADING = 2
 
@@ -47,8 +46,8 @@ HEADING = 2
 class State(NamedTuple):
     """The belief, and the path driven since the last scan; arrays are never written to."""
 
-    mean: Array
-    covariance: Array
+    mean: Floats
+    covariance: Floats
     path_m: float
 
 
@@ -153,7 +152,7 @@ class Ekf:
         pose = Pose(mean[0], mean[1], wrap_angle(mean[2]))
         return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
 
-    def _move(self, mean: Array, motion: Increment) -> tuple[Move, Array]:
+    def _move(self, mean: Floats, motion: Increment) -> tuple[Move, Floats]:
         """The move of the pose, and its Jacobian by the leading block of the state (pose, calibration): (3, 3 or 6)."""
         errors = mean[CALIBRATION].tolist() if self._calibrated else (0.0, 0.0, 0.0)
         step = move(float(mean[HEADING]), motion, *errors)
@@ -164,7 +163,7 @@ class Ekf:
         )
         return step, np.array(rows)[:, : 6 if self._calibrated else 3]
 
-    def _moved(self, state: State, motion: Increment) -> tuple[Array, Array]:
+    def _moved(self, state: State, motion: Increment) -> tuple[Floats, Floats]:
         """Mean and covariance after ``motion``: P <- F P Fᵀ + Q, where F is the identity but for the rows of the pose
         and the fading of the anchors' errors.
         """
@@ -185,7 +184,7 @@ class Ekf:
         return mean, covariance
 
     def _updated(
-        self, prior_mean: Array, prior_covariance: Array, path_m: float, scan: Radio
+        self, prior_mean: Floats, prior_covariance: Floats, path_m: float, scan: Radio
     ) -> tuple[State, tuple[Fate, ...]]:
         mean, covariance = prior_mean.copy(), prior_covariance
         fates = []
@@ -205,7 +204,7 @@ class Ekf:
             fates.append(Fate(*who, *verdict, innovation, spread, nis))
         return _state(mean, covariance, 0.0), tuple(fates)
 
-    def _linearise(self, reading: RadioReading, mean: Array, path_m: float) -> tuple[float, Array, float]:
+    def _linearise(self, reading: RadioReading, mean: Floats, path_m: float) -> tuple[float, Floats, float]:
         """Innovation, Jacobian row and variance of one reading at the belief ``mean``, ``path_m`` after the last."""
         x, y, heading = mean[POSE].tolist()
         expected = reading.expect(x, y, heading, self._world.robot.antenna_m)
@@ -222,7 +221,7 @@ class Ekf:
         return innovation - float(mean[bias]), row, variance
 
 
-def _state(mean: Array, covariance: Array, path_m: float) -> State:
+def _state(mean: Floats, covariance: Floats, path_m: float) -> State:
     """The state, its heading wrapped and its covariance symmetric to the last bit."""
     mean[HEADING] = wrap_angle(float(mean[HEADING]))
     return State(mean, 0.5 * (covariance + covariance.T), path_m)

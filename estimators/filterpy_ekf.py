@@ -33,10 +33,11 @@ from fusion import (
     radio_readings,
     wrap_angle,
 )
+from fusion.arrays import Floats
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.correlated_error import repeated_variance, require_max_correlated, total_variance
 from fusion.fates import chi_square_gate
-from fusion.weighted_points import Array, square_root
+from fusion.weighted_points import square_root
 
 if find_spec("filterpy") is None:
     # Its import takes a second, and waits until it is used; that it is missing is known at once.
@@ -70,11 +71,11 @@ class FilterpyFilter(ABC):
         """The filter of filterpy with the belief of ``state``, after ``motion``."""
 
     @abstractmethod
-    def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
+    def _expected(self, belief: Any, readings: Readings) -> tuple[Floats, Floats]:  # noqa: ANN401
         """What ``belief`` expects of each reading, and how uncertain it is of that; both (m,)."""
 
     @abstractmethod
-    def _correct(self, belief: Any, readings: Readings, noise: Array) -> None:  # noqa: ANN401
+    def _correct(self, belief: Any, readings: Readings, noise: Floats) -> None:  # noqa: ANN401
         """Bring all ``readings`` into ``belief`` by one update of filterpy; ``noise`` is R (m, m)."""
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
@@ -142,16 +143,16 @@ class FilterpyEkf(FilterpyFilter):
         belief.predict(u=belief.x + np.array(moved[:3]) - belief.F @ belief.x)
         return belief
 
-    def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
+    def _expected(self, belief: Any, readings: Readings) -> tuple[Floats, Floats]:  # noqa: ANN401
         values, jacobian = self._linearised(belief.x, readings)
         return values, np.einsum("mi,ij,mj->m", jacobian, belief.P, jacobian)
 
-    def _correct(self, belief: Any, readings: Readings, noise: Array) -> None:  # noqa: ANN401
+    def _correct(self, belief: Any, readings: Readings, noise: Floats) -> None:  # noqa: ANN401
         values, jacobian = self._linearised(belief.x, readings)
         seen = np.array([reading.value for reading in readings])
         belief.update(seen, lambda _: jacobian, lambda _: values, R=noise)
 
-    def _linearised(self, x: Array, readings: Readings) -> tuple[Array, Array]:
+    def _linearised(self, x: Floats, readings: Readings) -> tuple[Floats, Floats]:
         """Expected readings (m,) and their Jacobian (m, 3) at the pose ``x``."""
         px, py, heading = x.tolist()
         expected = [reading.expect(px, py, heading, self._world.robot.antenna_m) for reading in readings]
@@ -201,16 +202,16 @@ class FilterpyUkf(FilterpyFilter):
         belief.predict()
         return belief
 
-    def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
+    def _expected(self, belief: Any, readings: Readings) -> tuple[Floats, Floats]:  # noqa: ANN401
         expected = self._expected_at(belief.sigmas_f, readings)
         values = belief.Wm @ expected
         return values, belief.Wc @ np.square(expected - values)
 
-    def _correct(self, belief: Any, readings: Readings, noise: Array) -> None:  # noqa: ANN401
+    def _correct(self, belief: Any, readings: Readings, noise: Floats) -> None:  # noqa: ANN401
         seen = np.array([reading.value for reading in readings])
         belief.update(seen, R=noise, hx=lambda x: self._expected_at(x[None, :], readings)[0])
 
-    def _expected_at(self, poses: Array, readings: Readings) -> Array:
+    def _expected_at(self, poses: Floats, readings: Readings) -> Floats:
         """Expected readings (n, m) at ``poses`` (n, 3)."""
         antenna_m = self._world.robot.antenna_m
         x, y, heading = poses.T
@@ -218,6 +219,6 @@ class FilterpyUkf(FilterpyFilter):
         return np.array(columns).reshape(-1, len(poses)).T
 
 
-def moved(x: Array, motion: Increment) -> Array:
+def moved(x: Floats, motion: Increment) -> Floats:
     """The pose ``x`` (3,) after ``motion``; the heading is not wrapped, so that differences of poses stay plain."""
     return np.asarray(x + np.array(move(float(x[2]), motion)[:3]))

@@ -30,10 +30,11 @@ from fusion import (
     generator,
     radio_readings,
 )
+from fusion.arrays import Floats
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.correlated_error import repeated_variance, require_max_correlated
 from fusion.fates import judged
-from fusion.weighted_points import Array, mixture, moments, square_root
+from fusion.weighted_points import mixture, moments, square_root
 
 KERNEL = 0.1
 """Width of the resampling kernel as a share of the cloud's own standard deviation (Liu & West: small, e.g. 0.1)."""
@@ -49,8 +50,8 @@ class State(NamedTuple):
     """The cloud with its moments, and the path driven since the last scan; arrays are never written to."""
 
     seed: int
-    cloud: Array
-    weights: Array
+    cloud: Floats
+    weights: Floats
     pose: Pose
     covariance: Covariance
     path_m: float
@@ -142,7 +143,7 @@ class Particle:
         return State(state.seed, cloud, weights, *moments(weights, *cloud[:3]), 0.0), tuple(fates)
 
 
-def moved(cloud: Array, motion: Increment, random: np.random.Generator) -> Array:
+def moved(cloud: Floats, motion: Increment, random: np.random.Generator) -> Floats:
     """The cloud (6, n) after ``motion``, each particle with its own calibration error and its own noise."""
     if motion.duration_s == 0.0:
         return cloud
@@ -157,7 +158,7 @@ def moved(cloud: Array, motion: Increment, random: np.random.Generator) -> Array
     return after
 
 
-def resampled(cloud: Array, weights: Array, random: np.random.Generator) -> tuple[Array, Array]:
+def resampled(cloud: Floats, weights: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
     """As many particles of equal weight: systematic resampling, then the moment-preserving kernel of Liu & West."""
     count = len(weights)
     positions = (random.random() + np.arange(count)) / count

@@ -18,8 +18,8 @@ from fusion import (
     Tag,
     World,
     radio_readings,
+    unusable,
 )
-from fusion.fates import unusable
 from fusion.position_fix import Recent, fix_from, remember
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fusion.arrays import Floats
 from fusion.geometry import Pose
 from fusion.radio_reading import RadioReading
 from fusion.robot import Robot
@@ -18,8 +18,6 @@ from fusion.trilateration import Fix, are_collinear, trilaterate
 from fusion.values import Reason
 
 MINIMUM_ANCHORS = 3
-
-Array = NDArray[np.float64]
 
 
 class TimedReading(NamedTuple):
@@ -60,7 +58,7 @@ def fix_from(recent: Recent, robot: Robot) -> Fix | Reason:
     return trilaterate(anchors, flat, np.maximum(stds, 1e-3))
 
 
-def fix_innovation(pose: Pose, fix: Fix, robot: Robot) -> tuple[Array, Array]:
+def fix_innovation(pose: Pose, fix: Fix, robot: Robot) -> tuple[Floats, Floats]:
     """Fix minus the antenna's predicted position, (2,) [m], and that position's Jacobian by the pose, (2, 3)."""
     forward, left, _ = robot.antenna_m
     x, y = pose.transform(forward, left)

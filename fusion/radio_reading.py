@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fusion.arrays import Floats
 from fusion.radio import DistanceModel
 from fusion.values import Ranges, RssiReading, WifiScan
 from fusion.world import Anchor, World
@@ -48,11 +48,11 @@ class RadioReading(NamedTuple):
 
     def expected_values(
         self,
-        x: NDArray[np.float64],
-        y: NDArray[np.float64],
-        heading: NDArray[np.float64],
+        x: Floats,
+        y: Floats,
+        heading: Floats,
         antenna_m: tuple[float, float, float],
-    ) -> NDArray[np.float64]:
+    ) -> Floats:
         """`expect` over many poses at once, without derivatives; all arrays of one shape."""
         c, s = np.cos(heading), np.sin(heading)
         dx = x + c * antenna_m[0] - s * antenna_m[1] - self.anchor.x
