@@ -9,7 +9,7 @@ import numpy as np
 
 from fusion.conformance.folds import EXACT_M, NOISY, SEED, at, brief, require_same, updates_of
 from fusion.conformance.promise import Promise, promise, require
-from fusion.conformance.synthetic_run import Drive
+from fusion.conformance.synthetic_run import SyntheticRun
 from fusion.estimator import ParticleEstimator, Particles, Tag
 from fusion.fold import Update
 from fusion.tracker import Tracker
@@ -92,7 +92,7 @@ def _covariance(made: type[Any]) -> None:
 
 @promise(PROMISES, "heading-range", "A heading lies in (-pi, pi].")
 def _heading_range(made: type[Any]) -> None:
-    for update in updates_of(made, Drive(duration_s=60.0)):
+    for update in updates_of(made, SyntheticRun(duration_s=60.0)):
         heading = update.estimate.pose.heading
         require(-math.pi < heading <= math.pi, f"{at(update)} the heading is {heading:.6g}")
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from fusion.certificate import digest
 from fusion.conformance.promise import require
-from fusion.conformance.synthetic_run import Drive
+from fusion.conformance.synthetic_run import SyntheticRun
 from fusion.epochs import LONGEST, Epoch, Longest
 from fusion.estimator import Estimator
 from fusion.fold import Update
@@ -25,36 +25,38 @@ NEAR_M = 0.5
 """Error [m] that no estimator of noiseless data may pass once it has settled."""
 NEAR_RAD = 0.3
 """The same for a heading [rad]."""
-NOISY = Drive(noisy=True, duration_s=12.0)
-NOISELESS = Drive()
+NOISY = SyntheticRun(noisy=True, duration_s=12.0)
+NOISELESS = SyntheticRun()
 
 
 def updates_of(
     made: type[Any],
-    drive: Drive,
+    run: SyntheticRun,
     measurements: Sequence[Measurement] | None = None,
     prior: Prior | None = None,
     seed: int = SEED,
 ) -> list[Update]:
-    """The whole fold over a drive; its own measurements and prior unless others are given."""
-    world = drive.world()
-    given = drive.measurements() if measurements is None else measurements
-    return list(track(made(world), world, given, prior or drive.prior(), seed=seed))
+    """The whole fold over a run; its own measurements and prior unless others are given."""
+    world = run.world()
+    given = run.measurements() if measurements is None else measurements
+    return list(track(made(world), world, given, prior or run.prior(), seed=seed))
 
 
-def states_of(made: type[Any], drive: Drive, longest: Longest = LONGEST) -> Iterator[tuple[Estimator[Any], Any, Epoch]]:
+def states_of(
+    made: type[Any], run: SyntheticRun, longest: Longest = LONGEST
+) -> Iterator[tuple[Estimator[Any], Any, Epoch]]:
     """The bare fold, every state with the epoch that comes next."""
-    estimator = made(drive.world())
-    state = estimator.start(drive.prior(), SEED)
-    for epoch in _epochs(drive, longest):
+    estimator = made(run.world())
+    state = estimator.start(run.prior(), SEED)
+    for epoch in _epochs(run, longest):
         yield estimator, state, epoch
         state, _ = estimator.step(state, epoch.motion, epoch.scan)
 
 
-def _epochs(drive: Drive, longest: Longest) -> Iterator[Epoch]:
-    """The epochs of a drive, whose measurements are in order."""
-    timeline = Timeline(drive.world(), drive.prior().time_ns, longest=longest)
-    for measurement in drive.measurements():
+def _epochs(run: SyntheticRun, longest: Longest) -> Iterator[Epoch]:
+    """The epochs of a run, whose measurements are in order."""
+    timeline = Timeline(run.world(), run.prior().time_ns, longest=longest)
+    for measurement in run.measurements():
         for moment in timeline.push(measurement):
             yield from moment.epochs
 

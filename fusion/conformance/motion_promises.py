@@ -8,7 +8,7 @@ from typing import Any
 
 from fusion.conformance.folds import EXACT_M, NEAR_M, NEAR_RAD, NOISELESS, NOISY, at, brief, distance, updates_of
 from fusion.conformance.promise import Promise, promise, require
-from fusion.conformance.synthetic_run import Drive
+from fusion.conformance.synthetic_run import SyntheticRun
 from fusion.estimator import Tag
 from fusion.geometry import Pose, wrap_angle
 from fusion.values import nanoseconds
@@ -20,9 +20,12 @@ SETTLED_NS = nanoseconds(5.0)
 
 @promise(PROMISES, "no-jump-at-pi", "The heading follows the robot across ±pi.", unless=[Tag.NO_HEADING])
 def _no_jump_at_pi(made: type[Any]) -> None:
-    for drive in (Drive(duration_s=30.0), Drive(duration_s=30.0, start=Pose(5.0, 6.0, 0.0), turn_rate_rad_s=-0.25)):
-        for update in updates_of(made, drive):
-            truth = drive.pose(update.estimate.time_ns).heading
+    for run in (
+        SyntheticRun(duration_s=30.0),
+        SyntheticRun(duration_s=30.0, start=Pose(5.0, 6.0, 0.0), turn_rate_rad_s=-0.25),
+    ):
+        for update in updates_of(made, run):
+            truth = run.pose(update.estimate.time_ns).heading
             off = abs(wrap_angle(update.estimate.pose.heading - truth))
             require(off < NEAR_RAD, f"{at(update)} the heading is {brief(update.estimate)}, in truth {truth:.3f}")
 
@@ -56,7 +59,7 @@ def _world_turns(made: type[Any]) -> None:
     PROMISES, "forward-is-forward", "Driving forward goes forward, by the distance driven.", unless=[Tag.NO_HEADING]
 )
 def _forward_is_forward(made: type[Any]) -> None:
-    straight = Drive(8.0, turn_rate_rad_s=0.0, start=Pose(2.0, 2.0, 0.6), radio_until_s=0.0)
+    straight = SyntheticRun(8.0, turn_rate_rad_s=0.0, start=Pose(2.0, 2.0, 0.6), radio_until_s=0.0)
     last = updates_of(made, straight)[-1].estimate
     back = straight.pose(0).inverse().compose(last.pose)
     require(
@@ -67,14 +70,14 @@ def _forward_is_forward(made: type[Any]) -> None:
 @promise(PROMISES, "unknown-heading", "An unknown heading is not called known before it is.", unless=[Tag.NO_HEADING])
 def _unknown_heading(made: type[Any]) -> None:
     # The heading of such a prior means nothing; a wrong one shows whether it was used.
-    drive = replace(NOISELESS, start=Pose(5.0, 2.0, 0.8))
-    start = drive.prior()
+    run = replace(NOISELESS, start=Pose(5.0, 2.0, 0.8))
+    start = run.prior()
     lying = replace(start, heading_known=False, pose=start.pose._replace(heading=-2.0))
-    updates = updates_of(made, drive, prior=lying)
+    updates = updates_of(made, run, prior=lying)
     require(not updates[0].estimate.heading_known, "the start heading is unknown, yet reported known at once")
     for update in updates:
         estimate = update.estimate
-        off = abs(wrap_angle(estimate.pose.heading - drive.pose(estimate.time_ns).heading))
+        off = abs(wrap_angle(estimate.pose.heading - run.pose(estimate.time_ns).heading))
         require(
             not estimate.heading_known or off < 1.0, f"{at(update)} the heading is called known, off by {off:.3f} rad"
         )

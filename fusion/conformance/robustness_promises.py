@@ -8,7 +8,7 @@ from typing import Any
 
 from fusion.conformance.folds import EXACT_M, NEAR_M, NOISELESS, NOISY, at, brief, distance, updates_of
 from fusion.conformance.promise import Promise, promise, require
-from fusion.conformance.synthetic_run import Drive, with_outlier, without
+from fusion.conformance.synthetic_run import SyntheticRun, with_outlier, without
 from fusion.estimator import Tag
 from fusion.values import nanoseconds
 
@@ -52,7 +52,7 @@ def _outlier_is_bounded(made: type[Any]) -> None:
     PROMISES, "radio-silence", "Minutes without radio stay finite, and uncertainty grows.", unless=[Tag.NO_COVARIANCE]
 )
 def _radio_silence(made: type[Any]) -> None:
-    quiet = Drive(130.0, odometry_hz=2, radio_until_s=10.0)
+    quiet = SyntheticRun(130.0, odometry_hz=2, radio_until_s=10.0)
     updates = updates_of(made, quiet)
     before = next(update.estimate for update in updates if update.estimate.time_ns >= nanoseconds(10.0))
     last = updates[-1].estimate

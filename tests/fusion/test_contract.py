@@ -44,7 +44,7 @@ from fusion import (
     wrap_angle,
 )
 from fusion.cli.main import main
-from fusion.conformance.synthetic_run import Drive
+from fusion.conformance.synthetic_run import SyntheticRun
 from fusion.odometry import Odometer, wheel_increment
 from fusion.radio import PathLoss, Ranging, free_space_loss_db
 from fusion.robot import Robot
@@ -291,7 +291,7 @@ def test_message_stamped_right_behind_the_one_before_makes_no_leap(behind_ns, he
     assert 0.0 < held.turn_rad < 3.0 * 0.2
 
 
-DRIVE = Drive(noisy=True, duration_s=8.0)
+DRIVE = SyntheticRun(noisy=True, duration_s=8.0)
 
 
 def cut(measurements, at_ns):

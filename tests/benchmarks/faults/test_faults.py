@@ -28,7 +28,7 @@ from fusion import (
     built_in_names,
     load,
 )
-from fusion.conformance.synthetic_run import Drive
+from fusion.conformance.synthetic_run import SyntheticRun
 from fusion.odometry import Odometer
 from fusion.plugins import FAULTS
 from fusion.timeline import order
@@ -48,7 +48,7 @@ SCENARIO = replace(
 )
 RUN = simulated_run(SCENARIO, 3)
 """Wheel ticks, gyro, Wi-Fi and ranges; its first stamp is 0.02 s."""
-DRIVE = Drive(noisy=True, duration_s=20.0)
+DRIVE = SyntheticRun(noisy=True, duration_s=20.0)
 INCREMENTS = Run(Path("drive.mcap"), "drive", DRIVE.world(), None, {}, DRIVE.measurements(), None, (), {})
 """Increments of odometry, gyro, Wi-Fi and ranges."""
 START_NS = RUN.measurements[0].time_ns
