@@ -23,16 +23,17 @@ from fusion import (
     Pose,
     Prior,
     Radio,
-    Sighting,
+    RadioReading,
     Tag,
     World,
     compose,
-    sightings,
+    radio_readings,
 )
+from fusion.arrays import Floats
 from fusion.belief import HEADING_KNOWN_STD
-from fusion.correlated_error import repeated_variance, require_most_alike
+from fusion.correlated_error import repeated_variance, require_max_correlated
 from fusion.fates import judged
-from fusion.weighted_points import Array, carried, mixture, moments
+from fusion.weighted_points import carried, mixture, moments
 
 
 class State(NamedTuple):
@@ -40,7 +41,7 @@ class State(NamedTuple):
     the path driven since the last scan.
     """
 
-    histogram: Array
+    histogram: Floats
     pose: Pose
     covariance: Covariance
     pending: Increment
@@ -58,10 +59,10 @@ class BayesGrid:
         How many heading bins a full turn has.
     outlier_share
         Share of readings expected to be outliers, in (0, 1).
-    most_alike
+    max_correlated
         How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
         takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
-        20 where the world tells its `shadowing_length_m`, else 3.
+        20 where the world states its `shadowing_length_m`, else 3.
     """
 
     summary: ClassVar[str] = "histogram Bayes filter over floor and heading; starts from anywhere"
@@ -74,7 +75,7 @@ class BayesGrid:
         cells: int = 1600,
         headings: int = 24,
         outlier_share: float = 0.05,
-        most_alike: float | None = None,
+        max_correlated: float | None = None,
     ) -> None:
         if cells < 4 or headings < 4:
             raise ParameterError(f"bayes_grid: cells is {cells}, headings {headings}; give at least 4 of each")
@@ -82,7 +83,7 @@ class BayesGrid:
             raise ParameterError(f"bayes_grid: outlier_share is {outlier_share}; give a share between 0 and 1")
         self._world = world
         self._outlier_share = outlier_share
-        self._most_alike = require_most_alike("bayes_grid", most_alike)
+        self._max_correlated = require_max_correlated("bayes_grid", max_correlated)
         bounds = world.bounds
         width, depth = bounds.x_max - bounds.x_min, bounds.y_max - bounds.y_min
         self._cell_m = math.sqrt(width * depth / cells)
@@ -124,7 +125,7 @@ class BayesGrid:
         every = [np.broadcast_to(place, state.histogram.shape).ravel() for place in places]
         return Particles(np.column_stack(every), state.histogram.ravel())
 
-    def _state(self, histogram: Array, pending: Increment) -> State:
+    def _state(self, histogram: Floats, pending: Increment) -> State:
         """A state of normalised probabilities; within its cell a pose is uniform, hence the twelfths."""
         histogram = histogram / histogram.sum()
         pose, between = moments(histogram, self._x, self._y, self._heading)
@@ -136,10 +137,10 @@ class BayesGrid:
         """The state after the readings of a scan."""
         pose, covariance = compose(state.pose, state.covariance, state.pending)
         histogram, fates = state.histogram, []
-        for sighting in sightings(self._world, scan):
-            likelihood, good = self._likelihood(sighting, state.pending, state.path_m)
+        for reading in radio_readings(self._world, scan):
+            likelihood, good = self._likelihood(reading, state.pending, state.path_m)
             share = min(float(np.sum(state.histogram * good)), 1.0)
-            fates.append(judged(scan, sighting, pose, covariance, self._world.robot.antenna_m, share))
+            fates.append(judged(scan, reading, pose, covariance, self._world.robot.antenna_m, share))
             histogram = histogram * likelihood
             histogram = histogram / histogram.sum()
         return self._state(histogram, state.pending), tuple(fates)
@@ -149,19 +150,19 @@ class BayesGrid:
         noise = max(spread.xx, spread.yy) > (0.5 * self._cell_m) ** 2 or spread.hh > (0.5 * self._bin_rad) ** 2
         return noise or math.hypot(motion.x, motion.y) >= self._cell_m or abs(motion.heading) >= self._bin_rad
 
-    def _likelihood(self, sighting: Sighting, motion: Increment, path_m: float) -> tuple[Array, Array]:
+    def _likelihood(self, reading: RadioReading, motion: Increment, path_m: float) -> tuple[Floats, Floats]:
         """The mixture in every cell, moved by ``motion``, of a reading ``path_m`` after the one before; the reading's
         variance includes its spread within a cell.
         """
         x, y = carried(self._x, self._y, self._heading, motion)
-        expected = sighting.expected_values(x, y, self._heading + motion.heading, self._world.robot.antenna_m)
+        expected = reading.expected_values(x, y, self._heading + motion.heading, self._world.robot.antenna_m)
         # One heading's floor shows the spread within a cell well enough for all.
         by_x, by_y = np.gradient(expected[0])
-        spread = repeated_variance(sighting, path_m, self._most_alike)
+        spread = repeated_variance(reading, path_m, self._max_correlated)
         variance = spread + (by_x * by_x + by_y * by_y) / 12.0
-        return mixture(sighting.value - expected, variance, self._outlier_share)
+        return mixture(reading.value - expected, variance, self._outlier_share)
 
-    def _moved(self, histogram: Array, motion: Increment) -> Array:
+    def _moved(self, histogram: Floats, motion: Increment) -> Floats:
         """The histogram after ``motion``: each heading's floor is shifted and blurred along x and y, then the heading
         itself. What leaves the floor stays at its edge.
         """
@@ -180,12 +181,12 @@ class BayesGrid:
         return np.maximum(np.tensordot(turned, floors, axes=1), 0.0)
 
 
-def wrapped(angle: Array) -> Array:
+def wrapped(angle: Floats) -> Floats:
     """Angles [rad] brought into [-pi, pi)."""
     return np.asarray(np.remainder(angle + math.pi, math.tau) - math.pi)
 
 
-def shift_weights(distance: Array, mean: Array | float, variance: Array | float) -> Array:
+def shift_weights(distance: Floats, mean: Floats | float, variance: Floats | float) -> Floats:
     """Weight of moving by ``distance`` cells when the motion is normal and probability is shared linearly between
     the two nearest cells: the second difference of E[max(u - N, 0)]. Its mean is ``mean`` exactly.
     """
@@ -193,7 +194,7 @@ def shift_weights(distance: Array, mean: Array | float, variance: Array | float)
 
     std = np.sqrt(np.maximum(variance, 1e-6))
 
-    def ramp(u: Array) -> Array:
+    def ramp(u: Floats) -> Floats:
         density = np.exp(-0.5 * np.square(u / std)) / math.sqrt(math.tau)
         return np.asarray(u * ndtr(u / std) + std * density)
 
@@ -201,7 +202,7 @@ def shift_weights(distance: Array, mean: Array | float, variance: Array | float)
     return np.maximum(ramp(u + 1.0) - 2.0 * ramp(u) + ramp(u - 1.0), 0.0)
 
 
-def floor_kernel(mean: Array, variance: Array, size: int) -> Array:
+def floor_kernel(mean: Floats, variance: Floats, size: int) -> Floats:
     """Matrices (headings, to, from) that move probability along one axis by ``mean`` cells."""
     distance = np.arange(1.0 - size, size)
     weights = shift_weights(distance[None, :], mean[:, None], variance[:, None])
@@ -212,7 +213,7 @@ def floor_kernel(mean: Array, variance: Array, size: int) -> Array:
     return kernel
 
 
-def turn_kernel(mean: float, variance: float, size: int) -> Array:
+def turn_kernel(mean: float, variance: float, size: int) -> Floats:
     """The circular matrix (to, from) that turns probability by ``mean`` bins."""
     turns = np.arange(size) - mean
     # Three turns either way hold all the probability unless the heading is lost, and then any share is as good.

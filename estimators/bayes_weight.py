@@ -15,7 +15,6 @@ import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fusion import (
     Covariance,
@@ -31,16 +30,17 @@ from fusion import (
     Tag,
     World,
     compose,
-    sightings,
+    radio_readings,
+    unusable,
     wrap_angle,
 )
+from fusion.arrays import Floats
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.fates import fix_fates, unusable
+from fusion.fates import fix_fates
 from fusion.position_fix import Recent, fix_from, fix_innovation, remember
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds
 
-Array = NDArray[np.float64]
 USED_FROM = 0.5
 """A fix more likely good than not counts as used."""
 LARGEST_EXPONENT = 600.0
@@ -91,7 +91,7 @@ class BayesWeight:
         pose, covariance = compose(state.pose, state.covariance, motion)
         if scan is None:
             return state._replace(pose=pose, covariance=covariance), ()
-        seen = sightings(self._world, scan)
+        seen = radio_readings(self._world, scan)
         recent = remember(state.recent, scan.time_ns, seen, self._window_ns)
         fix = fix_from(recent, self._world.robot)
         if isinstance(fix, Reason):
@@ -127,7 +127,7 @@ class BayesWeight:
         spread = Covariance.from_matrix((0.5 * (p + p.T)).tolist())
         return Pose(x, y, wrap_angle(heading)), spread, good
 
-    def _probability_good(self, innovation: Array, s: Array) -> float:
+    def _probability_good(self, innovation: Floats, s: Floats) -> float:
         """Bayes' rule for two cases: N(innovation; 0, S) if good, uniform over the floor if an outlier."""
         half_nis = 0.5 * float(innovation @ np.linalg.solve(s, innovation))
         peak = 1.0 / (math.tau * math.sqrt(float(np.linalg.det(s))))

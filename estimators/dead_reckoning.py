@@ -21,9 +21,9 @@ from fusion import (
     Tag,
     World,
     compose,
+    unusable,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.fates import unusable
 
 
 class State(NamedTuple):

@@ -18,16 +18,17 @@ from fusion import (
     Pose,
     Prior,
     Radio,
+    RadioReading,
     Reason,
-    Sighting,
     Tag,
     World,
-    sightings,
+    radio_readings,
+    unusable,
     wrap_angle,
 )
 from fusion.belief import starting_belief
 from fusion.errors import did_you_mean
-from fusion.fates import fix_fates, unusable
+from fusion.fates import fix_fates
 from fusion.position_fix import Recent, fix_from, remember
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds
@@ -133,7 +134,7 @@ class DynamicWeight:
         state = self._moved(state, motion)
         if scan is None:
             return state, ()
-        seen = sightings(self._world, scan)
+        seen = radio_readings(self._world, scan)
         recent = remember(state.recent, scan.time_ns, seen, self._window_ns)
         fix = fix_from(recent, self._world.robot)  # Algorithm 1, line 4
         if isinstance(fix, Reason):
@@ -159,7 +160,7 @@ class DynamicWeight:
         return fix.x - arm_x, fix.y - arm_y
 
     def _fuse(
-        self, state: State, fix: tuple[float, float], scan: Radio, seen: tuple[Sighting, ...]
+        self, state: State, fix: tuple[float, float], scan: Radio, seen: tuple[RadioReading, ...]
     ) -> tuple[State, tuple[Fate, ...]]:
         """Algorithm 1, lines 5 and 6. From an unknown position, odometry starts at the first fix."""
         expected = (state.odometry, None) if state.position_known else None

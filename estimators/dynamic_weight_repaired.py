@@ -32,10 +32,11 @@ from fusion import (
     Tag,
     World,
     compose,
-    sightings,
+    radio_readings,
+    unusable,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.fates import fix_fates, unusable
+from fusion.fates import fix_fates
 from fusion.position_fix import Recent, fix_from, fix_innovation, remember
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds
@@ -105,7 +106,7 @@ class DynamicWeightRepaired:
         pose, covariance = compose(state.pose, state.covariance, motion)
         if scan is None:
             return state._replace(pose=pose, covariance=covariance), ()
-        seen = sightings(self._world, scan)
+        seen = radio_readings(self._world, scan)
         recent = remember(state.recent, scan.time_ns, seen, self._window_ns)
         fix = fix_from(recent, self._world.robot)
         if isinstance(fix, Reason):

@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fusion import (
     Covariance,
@@ -26,20 +25,20 @@ from fusion import (
     Pose,
     Prior,
     Radio,
+    RadioReading,
     Reason,
-    Sighting,
     Tag,
     World,
     move,
-    sightings,
+    radio_readings,
     wrap_angle,
 )
+from fusion.arrays import Floats
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.correlated_error import require_most_alike, sharing
+from fusion.correlated_error import correlated_count_of, require_max_correlated
 from fusion.fates import chi_square_gate
 from fusion.radio import PathLoss, Ranging
 
-Array = NDArray[np.float64]
 POSE, CALIBRATION = slice(0, 3), slice(3, 6)
 HEADING = 2
 
@@ -47,8 +46,8 @@ HEADING = 2
 class State(NamedTuple):
     """The belief, and the path driven since the last scan; arrays are never written to."""
 
-    mean: Array
-    covariance: Array
+    mean: Floats
+    covariance: Floats
     path_m: float
 
 
@@ -70,10 +69,10 @@ class Ekf:
     rssi_bias_length_m, range_bias_length_m
         Path after which an anchor's common error is forgotten by 1/e [m], where the world does not tell: shadowing
         belongs to the place, a range offset to the radio.
-    most_alike
+    max_correlated
         How many neighbouring readings of an anchor at most are taken to share one error, where that is not a state. 1
         takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
-        20 where the world tells its `shadowing_length_m`, else 3.
+        20 where the world states its `shadowing_length_m`, else 3.
     """
 
     summary: ClassVar[str] = "extended Kalman filter with odometry calibration and anchor biases as states"
@@ -89,7 +88,7 @@ class Ekf:
         estimate_rssi_bias: bool | None = None,
         rssi_bias_length_m: float = 2.0,
         range_bias_length_m: float = 100.0,
-        most_alike: float | None = None,
+        max_correlated: float | None = None,
     ) -> None:
         if not 0.0 < gate_probability <= 1.0:
             raise ParameterError(f"ekf: gate_probability is {gate_probability}; give a probability in (0, 1]")
@@ -98,7 +97,7 @@ class Ekf:
                 raise ParameterError(f"ekf: a bias length is {length_m}; give a length greater than zero")
         self._world = world
         self._gate = chi_square_gate(gate_probability)
-        self._most_alike = require_most_alike("ekf", most_alike)
+        self._max_correlated = require_max_correlated("ekf", max_correlated)
         noise = world.robot.noise
         calibration = (noise.distance_scale_std, noise.turn_scale_std, noise.turn_bias_std_rad_s)
         self._calibrated = estimate_odometry and any(calibration)
@@ -153,7 +152,7 @@ class Ekf:
         pose = Pose(mean[0], mean[1], wrap_angle(mean[2]))
         return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
 
-    def _move(self, mean: Array, motion: Increment) -> tuple[Move, Array]:
+    def _move(self, mean: Floats, motion: Increment) -> tuple[Move, Floats]:
         """The move of the pose, and its Jacobian by the leading block of the state (pose, calibration): (3, 3 or 6)."""
         errors = mean[CALIBRATION].tolist() if self._calibrated else (0.0, 0.0, 0.0)
         step = move(float(mean[HEADING]), motion, *errors)
@@ -164,7 +163,7 @@ class Ekf:
         )
         return step, np.array(rows)[:, : 6 if self._calibrated else 3]
 
-    def _moved(self, state: State, motion: Increment) -> tuple[Array, Array]:
+    def _moved(self, state: State, motion: Increment) -> tuple[Floats, Floats]:
         """Mean and covariance after ``motion``: P <- F P Fᵀ + Q, where F is the identity but for the rows of the pose
         and the fading of the anchors' errors.
         """
@@ -185,12 +184,12 @@ class Ekf:
         return mean, covariance
 
     def _updated(
-        self, prior_mean: Array, prior_covariance: Array, path_m: float, scan: Radio
+        self, prior_mean: Floats, prior_covariance: Floats, path_m: float, scan: Radio
     ) -> tuple[State, tuple[Fate, ...]]:
         mean, covariance = prior_mean.copy(), prior_covariance
         fates = []
-        for sighting in sightings(self._world, scan):
-            innovation, row, variance = self._linearise(sighting, prior_mean, path_m)
+        for reading in radio_readings(self._world, scan):
+            innovation, row, variance = self._linearise(reading, prior_mean, path_m)
             spread = float(row @ prior_covariance @ row) + variance
             nis = innovation * innovation / spread
             used = nis <= self._gate
@@ -201,28 +200,28 @@ class Ekf:
                 mean = mean + gain_numerator * (remaining / total)
                 covariance = covariance - np.outer(gain_numerator, gain_numerator / total)
             verdict = (Decision.USED, Reason.OK, 1.0) if used else (Decision.REJECTED, Reason.GATE, 0.0)
-            who = (scan.time_ns, scan.sensor, scan.seq, sighting.anchor.id)
+            who = (scan.time_ns, scan.sensor, scan.seq, reading.anchor.id)
             fates.append(Fate(*who, *verdict, innovation, spread, nis))
         return _state(mean, covariance, 0.0), tuple(fates)
 
-    def _linearise(self, sighting: Sighting, mean: Array, path_m: float) -> tuple[float, Array, float]:
+    def _linearise(self, reading: RadioReading, mean: Floats, path_m: float) -> tuple[float, Floats, float]:
         """Innovation, Jacobian row and variance of one reading at the belief ``mean``, ``path_m`` after the last."""
         x, y, heading = mean[POSE].tolist()
-        expected = sighting.expect(x, y, heading, self._world.robot.antenna_m)
+        expected = reading.expect(x, y, heading, self._world.robot.antenna_m)
         row = np.zeros(len(mean))
         row[POSE] = expected.by_x, expected.by_y, expected.by_heading
-        innovation, variance, kind = sighting.value - expected.value, sighting.variance, type(sighting.model)
+        innovation, variance, kind = reading.value - expected.value, reading.variance, type(reading.model)
         if (gain := self._gain_index.get(kind)) is not None:
             row[gain] = expected.by_gain
             innovation -= expected.by_gain * float(mean[gain])
-        if (bias := self._bias_index.get((sighting.anchor.id, kind))) is None:
-            times = sharing(sighting.model, path_m, self._most_alike, self._lengths_m[kind])
-            return innovation, row, variance + times * sighting.model.bias_std**2
+        if (bias := self._bias_index.get((reading.anchor.id, kind))) is None:
+            times = correlated_count_of(reading.model, path_m, self._max_correlated, self._lengths_m[kind])
+            return innovation, row, variance + times * reading.model.bias_std**2
         row[bias] = 1.0
         return innovation - float(mean[bias]), row, variance
 
 
-def _state(mean: Array, covariance: Array, path_m: float) -> State:
+def _state(mean: Floats, covariance: Floats, path_m: float) -> State:
     """The state, its heading wrapped and its covariance symmetric to the last bit."""
     mean[HEADING] = wrap_angle(float(mean[HEADING]))
     return State(mean, 0.5 * (covariance + covariance.T), path_m)

@@ -25,24 +25,25 @@ from fusion import (
     Pose,
     Prior,
     Radio,
+    RadioReading,
     Reason,
-    Sighting,
     Tag,
     World,
     move,
-    sightings,
+    radio_readings,
     wrap_angle,
 )
+from fusion.arrays import Floats
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.correlated_error import repeated_variance, require_most_alike, total_variance
+from fusion.correlated_error import repeated_variance, require_max_correlated, total_variance
 from fusion.fates import chi_square_gate
-from fusion.weighted_points import Array, square_root
+from fusion.weighted_points import square_root
 
 if find_spec("filterpy") is None:
     # Its import takes a second, and waits until it is used; that it is missing is known at once.
     raise ModuleNotFoundError("No module named 'filterpy'", name="filterpy")
 
-Readings = tuple[Sighting, ...]
+Readings = tuple[RadioReading, ...]
 
 
 class State(NamedTuple):
@@ -58,23 +59,23 @@ class FilterpyFilter(ABC):
 
     tags: ClassVar[frozenset[Tag]] = frozenset({Tag.HEADING_START})
 
-    def __init__(self, world: World, *, gate_probability: float = 0.999, most_alike: float | None = None) -> None:
+    def __init__(self, world: World, *, gate_probability: float = 0.999, max_correlated: float | None = None) -> None:
         if not 0.0 < gate_probability <= 1.0:
             raise ParameterError(f"filterpy: gate_probability is {gate_probability}; give a probability in (0, 1]")
         self._world = world
         self._gate = chi_square_gate(gate_probability)
-        self._most_alike = require_most_alike("filterpy", most_alike)
+        self._max_correlated = require_max_correlated("filterpy", max_correlated)
 
     @abstractmethod
     def _predicted(self, state: State, motion: Increment) -> Any:  # noqa: ANN401 - filterpy is not typed
         """The filter of filterpy with the belief of ``state``, after ``motion``."""
 
     @abstractmethod
-    def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
+    def _expected(self, belief: Any, readings: Readings) -> tuple[Floats, Floats]:  # noqa: ANN401
         """What ``belief`` expects of each reading, and how uncertain it is of that; both (m,)."""
 
     @abstractmethod
-    def _correct(self, belief: Any, readings: Readings, noise: Array) -> None:  # noqa: ANN401
+    def _correct(self, belief: Any, readings: Readings, noise: Floats) -> None:  # noqa: ANN401
         """Bring all ``readings`` into ``belief`` by one update of filterpy; ``noise`` is R (m, m)."""
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
@@ -98,20 +99,20 @@ class FilterpyFilter(ABC):
 
     def _update(self, belief: Any, scan: Radio, path_m: float) -> tuple[Fate, ...]:  # noqa: ANN401
         """Bring the readings of a scan, ``path_m`` after the last, into ``belief``."""
-        readings = sightings(self._world, scan)
+        readings = radio_readings(self._world, scan)
         values, variances = self._expected(belief, readings)
         fates, used = [], []
-        for sighting, value, variance in zip(readings, values.tolist(), variances.tolist(), strict=True):
-            innovation, spread = sighting.value - value, variance + total_variance(sighting)
+        for reading, value, variance in zip(readings, values.tolist(), variances.tolist(), strict=True):
+            innovation, spread = reading.value - value, variance + total_variance(reading)
             nis = innovation * innovation / spread
             taken = nis <= self._gate
             if taken:
-                used.append(sighting)
+                used.append(reading)
             verdict = (Decision.USED, Reason.OK, 1.0) if taken else (Decision.REJECTED, Reason.GATE, 0.0)
-            who = (scan.time_ns, scan.sensor, scan.seq, sighting.anchor.id)
+            who = (scan.time_ns, scan.sensor, scan.seq, reading.anchor.id)
             fates.append(Fate(*who, *verdict, innovation, spread, nis))
         if used:
-            noise = np.diag([repeated_variance(sighting, path_m, self._most_alike) for sighting in used])
+            noise = np.diag([repeated_variance(reading, path_m, self._max_correlated) for reading in used])
             self._correct(belief, tuple(used), noise)
         return tuple(fates)
 
@@ -124,10 +125,10 @@ class FilterpyEkf(FilterpyFilter):
     gate_probability
         A reading is refused when its normalised innovation squared is beyond this quantile of chi-square with one
         degree of freedom. 1.0 takes every reading.
-    most_alike
+    max_correlated
         How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
         takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
-        20 where the world tells its `shadowing_length_m`, else 3.
+        20 where the world states its `shadowing_length_m`, else 3.
     """
 
     summary: ClassVar[str] = "extended Kalman filter of filterpy"
@@ -142,19 +143,19 @@ class FilterpyEkf(FilterpyFilter):
         belief.predict(u=belief.x + np.array(moved[:3]) - belief.F @ belief.x)
         return belief
 
-    def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
+    def _expected(self, belief: Any, readings: Readings) -> tuple[Floats, Floats]:  # noqa: ANN401
         values, jacobian = self._linearised(belief.x, readings)
         return values, np.einsum("mi,ij,mj->m", jacobian, belief.P, jacobian)
 
-    def _correct(self, belief: Any, readings: Readings, noise: Array) -> None:  # noqa: ANN401
+    def _correct(self, belief: Any, readings: Readings, noise: Floats) -> None:  # noqa: ANN401
         values, jacobian = self._linearised(belief.x, readings)
-        seen = np.array([sighting.value for sighting in readings])
+        seen = np.array([reading.value for reading in readings])
         belief.update(seen, lambda _: jacobian, lambda _: values, R=noise)
 
-    def _linearised(self, x: Array, readings: Readings) -> tuple[Array, Array]:
+    def _linearised(self, x: Floats, readings: Readings) -> tuple[Floats, Floats]:
         """Expected readings (m,) and their Jacobian (m, 3) at the pose ``x``."""
         px, py, heading = x.tolist()
-        expected = [sighting.expect(px, py, heading, self._world.robot.antenna_m) for sighting in readings]
+        expected = [reading.expect(px, py, heading, self._world.robot.antenna_m) for reading in readings]
         rows = [(e.by_x, e.by_y, e.by_heading) for e in expected]
         return np.array([e.value for e in expected]), np.array(rows).reshape(-1, 3)
 
@@ -182,10 +183,10 @@ class FilterpyUkf(FilterpyFilter):
     gate_probability
         A reading is refused when its normalised innovation squared is beyond this quantile of chi-square with one
         degree of freedom. 1.0 takes every reading.
-    most_alike
+    max_correlated
         How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
         takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
-        20 where the world tells its `shadowing_length_m`, else 3.
+        20 where the world states its `shadowing_length_m`, else 3.
     """
 
     summary: ClassVar[str] = "unscented Kalman filter of filterpy"
@@ -201,23 +202,23 @@ class FilterpyUkf(FilterpyFilter):
         belief.predict()
         return belief
 
-    def _expected(self, belief: Any, readings: Readings) -> tuple[Array, Array]:  # noqa: ANN401
+    def _expected(self, belief: Any, readings: Readings) -> tuple[Floats, Floats]:  # noqa: ANN401
         expected = self._expected_at(belief.sigmas_f, readings)
         values = belief.Wm @ expected
         return values, belief.Wc @ np.square(expected - values)
 
-    def _correct(self, belief: Any, readings: Readings, noise: Array) -> None:  # noqa: ANN401
-        seen = np.array([sighting.value for sighting in readings])
+    def _correct(self, belief: Any, readings: Readings, noise: Floats) -> None:  # noqa: ANN401
+        seen = np.array([reading.value for reading in readings])
         belief.update(seen, R=noise, hx=lambda x: self._expected_at(x[None, :], readings)[0])
 
-    def _expected_at(self, poses: Array, readings: Readings) -> Array:
+    def _expected_at(self, poses: Floats, readings: Readings) -> Floats:
         """Expected readings (n, m) at ``poses`` (n, 3)."""
         antenna_m = self._world.robot.antenna_m
         x, y, heading = poses.T
-        columns = [sighting.expected_values(x, y, heading, antenna_m) for sighting in readings]
+        columns = [reading.expected_values(x, y, heading, antenna_m) for reading in readings]
         return np.array(columns).reshape(-1, len(poses)).T
 
 
-def moved(x: Array, motion: Increment) -> Array:
+def moved(x: Floats, motion: Increment) -> Floats:
     """The pose ``x`` (3,) after ``motion``; the heading is not wrapped, so that differences of poses stay plain."""
     return np.asarray(x + np.array(move(float(x[2]), motion)[:3]))

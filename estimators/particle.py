@@ -28,12 +28,13 @@ from fusion import (
     World,
     compose,
     generator,
-    sightings,
+    radio_readings,
 )
+from fusion.arrays import Floats
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
-from fusion.correlated_error import repeated_variance, require_most_alike
+from fusion.correlated_error import repeated_variance, require_max_correlated
 from fusion.fates import judged
-from fusion.weighted_points import Array, mixture, moments, square_root
+from fusion.weighted_points import mixture, moments, square_root
 
 KERNEL = 0.1
 """Width of the resampling kernel as a share of the cloud's own standard deviation (Liu & West: small, e.g. 0.1)."""
@@ -49,8 +50,8 @@ class State(NamedTuple):
     """The cloud with its moments, and the path driven since the last scan; arrays are never written to."""
 
     seed: int
-    cloud: Array
-    weights: Array
+    cloud: Floats
+    weights: Floats
     pose: Pose
     covariance: Covariance
     path_m: float
@@ -65,17 +66,17 @@ class Particle:
         How many; time and memory grow in proportion.
     outlier_share
         Share of readings expected to be outliers, in (0, 1).
-    most_alike
+    max_correlated
         How many neighbouring signal strengths of an anchor at most are taken to share one error, that of the place. 1
         takes all as independent; more is more honest where shadowing is strong, and slower to correct odometry. None:
-        20 where the world tells its `shadowing_length_m`, else 3.
+        20 where the world states its `shadowing_length_m`, else 3.
     """
 
     summary: ClassVar[str] = "particle filter with an outlier mixture; starts from anywhere"
     tags: ClassVar[frozenset[Tag]] = frozenset({Tag.STOCHASTIC, Tag.GLOBAL_START, Tag.HEADING_START})
 
     def __init__(
-        self, world: World, *, particles: int = 1000, outlier_share: float = 0.05, most_alike: float | None = None
+        self, world: World, *, particles: int = 1000, outlier_share: float = 0.05, max_correlated: float | None = None
     ) -> None:
         if particles < 1:
             raise ParameterError(f"particle: particles is {particles}; give at least 1")
@@ -84,7 +85,7 @@ class Particle:
         self._world = world
         self._count = particles
         self._outlier_share = outlier_share
-        self._most_alike = require_most_alike("particle", most_alike)
+        self._max_correlated = require_max_correlated("particle", max_correlated)
 
     def start(self, prior: Prior, seed: int) -> State:
         """A cloud drawn from the prior; uniform over the floor, or all headings, where that is unknown."""
@@ -126,15 +127,15 @@ class Particle:
         cloud, weights = state.cloud, state.weights
         pose, covariance = moments(weights, *cloud[:3])
         antenna_m, fates, log_weights = self._world.robot.antenna_m, [], np.log(weights)
-        for sighting in sightings(self._world, scan):
-            expected = sighting.expected_values(cloud[X], cloud[Y], cloud[HEADING], antenna_m)
+        for reading in radio_readings(self._world, scan):
+            expected = reading.expected_values(cloud[X], cloud[Y], cloud[HEADING], antenna_m)
             between = float(weights @ np.square(expected - weights @ expected))
-            spread = repeated_variance(sighting, state.path_m, self._most_alike)
+            spread = repeated_variance(reading, state.path_m, self._max_correlated)
             variance = spread + BANDWIDTH**2 * between
-            likelihood, good = mixture(sighting.value - expected, variance, self._outlier_share)
+            likelihood, good = mixture(reading.value - expected, variance, self._outlier_share)
             log_weights = log_weights + np.log(likelihood)
             share = min(float(weights @ good), 1.0)
-            fates.append(judged(scan, sighting, pose, covariance, antenna_m, share))
+            fates.append(judged(scan, reading, pose, covariance, antenna_m, share))
         weights = np.exp(log_weights - log_weights.max())
         weights = np.maximum(weights / weights.sum(), np.finfo(float).tiny)
         if 1.0 / float(weights @ weights) < 0.5 * self._count:
@@ -142,7 +143,7 @@ class Particle:
         return State(state.seed, cloud, weights, *moments(weights, *cloud[:3]), 0.0), tuple(fates)
 
 
-def moved(cloud: Array, motion: Increment, random: np.random.Generator) -> Array:
+def moved(cloud: Floats, motion: Increment, random: np.random.Generator) -> Floats:
     """The cloud (6, n) after ``motion``, each particle with its own calibration error and its own noise."""
     if motion.duration_s == 0.0:
         return cloud
@@ -157,7 +158,7 @@ def moved(cloud: Array, motion: Increment, random: np.random.Generator) -> Array
     return after
 
 
-def resampled(cloud: Array, weights: Array, random: np.random.Generator) -> tuple[Array, Array]:
+def resampled(cloud: Floats, weights: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
     """As many particles of equal weight: systematic resampling, then the moment-preserving kernel of Liu & West."""
     count = len(weights)
     positions = (random.random() + np.arange(count)) / count

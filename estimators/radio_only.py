@@ -17,9 +17,9 @@ from fusion import (
     Reason,
     Tag,
     World,
-    sightings,
+    radio_readings,
+    unusable,
 )
-from fusion.fates import unusable
 from fusion.position_fix import Recent, fix_from, remember
 from fusion.trilateration import Fix
 from fusion.values import nanoseconds
@@ -68,7 +68,7 @@ class RadioOnly:
         """Make a fix from what was heard lately, if three anchors were."""
         if scan is None:
             return state, ()
-        recent = remember(state.recent, scan.time_ns, sightings(self._world, scan), self._window_ns)
+        recent = remember(state.recent, scan.time_ns, radio_readings(self._world, scan), self._window_ns)
         fix = fix_from(recent, self._world.robot)
         if isinstance(fix, Reason):
             return state._replace(recent=recent), unusable(scan, fix)

@@ -49,7 +49,8 @@ from fusion.fold import Fold, Update
 from fusion.geometry import Covariance, Pose, wrap_angle
 from fusion.motion import Increment, Move, compose, move
 from fusion.plugins import available, build, built_in_names, load, names, registered
-from fusion.radio_reading import Sighting, sightings
+from fusion.radio_reading import RadioReading, radio_readings
+from fusion.robot import OdometryNoise, Robot
 from fusion.timeline import Moment, Timeline
 from fusion.tracker import Tracker, final, track
 from fusion.values import (
@@ -70,7 +71,7 @@ from fusion.values import (
     WheelTicks,
     WifiScan,
 )
-from fusion.world import Anchor, Bounds, OdometryNoise, Robot, World
+from fusion.world import Anchor, Bounds, World
 
 __version__ = "0.1.0"
 
@@ -124,6 +125,7 @@ __all__ = [
     "Prior",
     "ProtocolError",
     "Radio",
+    "RadioReading",
     "RangeReading",
     "Ranges",
     "Reason",
@@ -131,7 +133,6 @@ __all__ = [
     "Robot",
     "RssiReading",
     "SettingError",
-    "Sighting",
     "SuiteError",
     "Tag",
     "Timeline",
@@ -155,8 +156,8 @@ __all__ = [
     "load",
     "move",
     "names",
+    "radio_readings",
     "registered",
-    "sightings",
     "track",
     "unusable",
     "wrap_angle",

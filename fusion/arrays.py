@@ -1,4 +1,4 @@
-"""Array types by element, their shapes told in docstrings; points of the plane as complex numbers."""
+"""Array types by element, their shapes stated in docstrings; points of the plane as complex numbers."""
 
 from __future__ import annotations
 
@@ -6,17 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-
-
 Whole = NDArray[np.int64]
-
-
 Stamps = Whole
-
-
+"""Times [ns]."""
 Points = NDArray[np.complex128]
-
-
+"""Points of the plane, x + iy [m]."""
 Flags = NDArray[np.bool_]
 
 

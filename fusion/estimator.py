@@ -12,8 +12,8 @@ from enum import Enum, unique
 from typing import ClassVar, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fusion.arrays import Floats
 from fusion.motion import Increment
 from fusion.values import Estimate, Fate, Prior, Radio
 
@@ -70,8 +70,8 @@ class Estimator(Protocol[State]):
 class Particles(NamedTuple):
     """A belief as weighted points: ``positions`` (n, 2) [m], map frame, and ``weights`` (n,), which sum to one."""
 
-    positions: NDArray[np.float64]
-    weights: NDArray[np.float64]
+    positions: Floats
+    weights: Floats
 
     @property
     def effective_number(self) -> float:

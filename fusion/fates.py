@@ -8,9 +8,9 @@ import numpy as np
 
 from fusion.correlated_error import total_variance
 from fusion.geometry import Covariance, Pose
-from fusion.radio_reading import Sighting
+from fusion.radio_reading import RadioReading
+from fusion.robot import Robot
 from fusion.values import Decision, Fate, Measurement, Radio, Ranges, Reason, WifiScan
-from fusion.world import Robot
 
 
 def fate(measurement: Measurement, anchor: str, decision: Decision, reason: Reason) -> Fate:
@@ -31,7 +31,7 @@ def unusable(measurement: Measurement, reason: Reason) -> tuple[Fate, ...]:
 
 def fix_fates(
     scan: Radio,
-    seen: tuple[Sighting, ...],
+    seen: tuple[RadioReading, ...],
     robot: Robot,
     belief: tuple[Pose, Covariance | None] | None,
     verdict: tuple[Decision, Reason],
@@ -65,20 +65,20 @@ DOUBTED_BELOW = 0.5
 
 def judged(
     scan: Radio,
-    sighting: Sighting,
+    reading: RadioReading,
     pose: Pose,
     covariance: Covariance,
     antenna_m: tuple[float, float, float],
     weight: float,
 ) -> Fate:
     """The Fate of a reading of that ``weight``; its innovation is against the mean ``pose`` before the scan."""
-    expected = sighting.expect(*pose, antenna_m)
+    expected = reading.expect(*pose, antenna_m)
     row = np.array([expected.by_x, expected.by_y, expected.by_heading])
-    innovation = sighting.value - expected.value
-    spread = float(row @ np.array(covariance.matrix) @ row) + total_variance(sighting)
+    innovation = reading.value - expected.value
+    spread = float(row @ np.array(covariance.matrix) @ row) + total_variance(reading)
     doubted = weight < DOUBTED_BELOW
     verdict = (Decision.DOWNWEIGHTED, Reason.ROBUST_LOSS) if doubted else (Decision.USED, Reason.OK)
-    who = (scan.time_ns, scan.sensor, scan.seq, sighting.anchor.id)
+    who = (scan.time_ns, scan.sensor, scan.seq, reading.anchor.id)
     return Fate(*who, *verdict, weight, innovation, spread, innovation * innovation / spread)
 
 

@@ -15,14 +15,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from fusion.arrays import Floats
 from fusion.geometry import Covariance, Pose, wrap_angle
+from fusion.robot import OdometryNoise
 from fusion.values import Odometry, seconds
-from fusion.world import OdometryNoise
 
-Number = TypeVar("Number", float, NDArray[np.float64])
+Number = TypeVar("Number", float, Floats)
 NO_NOISE = Covariance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from fusion.errors import MeasurementError
 from fusion.geometry import wrap_angle
+from fusion.robot import WHEELS, Robot
 from fusion.values import Gyro, Motion, MotorCommand, Odometry, WheelTicks, nanoseconds, seconds
-from fusion.world import DRIVES, Robot
 
 MAX_HOLD_NS = nanoseconds(0.5)
 """Longest time a twist is held without new odometry, unless odometry itself comes more slowly."""
@@ -166,7 +166,7 @@ class Odometer:
         return state._replace(forward=_forward(state.forward, measurement.wheel_speeds_m_s)), ()
 
     def _require_wheels(self, count: int, measurement: WheelTicks | MotorCommand) -> None:
-        wheels = DRIVES[self.robot.drive]
+        wheels = len(WHEELS[self.robot.drive])
         if count != wheels:
             raise MeasurementError(
                 f"{type(measurement).__name__} of {measurement.sensor!r} at {measurement.time_ns} ns tells of {count} "

@@ -6,9 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fusion.arrays import Floats
+from fusion.arrays import Flags, Floats
 
 
 def known(values: Floats) -> Floats:
@@ -16,19 +15,19 @@ def known(values: Floats) -> Floats:
     return values[~np.isnan(values)] if math.isnan(np.add.reduce(values)) else values
 
 
-def mean(values: Floats | NDArray[np.bool_], weight: Floats | None = None) -> float:
+def mean(values: Floats | Flags, weight: Floats | None = None) -> float:
     """The mean, every value counting ``weight`` times (None: once); NaN of nothing."""
     if len(values) == 0:
         return math.nan
     return float(np.add.reduce(values, dtype=np.float64) / len(values) if weight is None else weighted(values, weight))
 
 
-def weighted(values: Floats | NDArray[np.bool_], weight: Floats) -> float:
+def weighted(values: Floats | Flags, weight: Floats) -> float:
     """Sum of values times weights over the sum of the weights."""
     return float(weight @ values / np.add.reduce(weight))
 
 
-def means(rows: Floats | NDArray[np.bool_], weight: Floats | None = None) -> list[float]:
+def means(rows: Floats | Flags, weight: Floats | None = None) -> list[float]:
     """The mean of each row of (k, n), values counting ``weight`` (n,) times (None: once); NaN of nothing."""
     count = rows.shape[1]
     if count == 0:

@@ -15,14 +15,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from fusion.arrays import Floats
 
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 
-Array = NDArray[np.float64]
+RadioKind = Literal["rssi", "range"]
+"""Signal strengths in dBm, or ranges in metres."""
 
 
 def free_space_loss_db(distance_m: float, frequency_hz: float) -> float:
@@ -42,13 +45,13 @@ class DistanceModel(Protocol):
     def bias_std(self) -> float:
         """How far all readings of one anchor may be off together, one standard deviation, in the reading's unit."""
 
-    def expected(self, distance_m: ArrayLike) -> Array:
+    def expected(self, distance_m: ArrayLike) -> Floats:
         """The reading expected at ``distance_m``."""
 
-    def slope(self, distance_m: ArrayLike) -> Array:
+    def slope(self, distance_m: ArrayLike) -> Floats:
         """Derivative of ``expected`` [reading's unit / m]."""
 
-    def distance(self, reading: ArrayLike) -> Array:
+    def distance(self, reading: ArrayLike) -> Floats:
         """The distance [m] at which ``reading`` is expected."""
 
     @property
@@ -59,7 +62,7 @@ class DistanceModel(Protocol):
     def gain_std(self) -> float:
         """How far the dependence on distance may be off for all anchors together, one standard deviation."""
 
-    def by_gain(self, distance_m: ArrayLike) -> Array:
+    def by_gain(self, distance_m: ArrayLike) -> Floats:
         """Derivative of ``expected`` by that common error."""
 
 
@@ -105,18 +108,18 @@ class PathLoss:
         """It belongs to the place as far as it is shadowing."""
         return self.shadowing_length_m
 
-    def expected(self, distance_m: ArrayLike) -> Array:
+    def expected(self, distance_m: ArrayLike) -> Floats:
         """RSSI [dBm] expected at ``distance_m``; constant below the reference distance."""
         decades = np.log10(np.maximum(distance_m, self.reference_distance_m) / self.reference_distance_m)
         return np.asarray(self.rssi_at_reference_dbm - 10.0 * self.path_loss_exponent * decades)
 
-    def slope(self, distance_m: ArrayLike) -> Array:
+    def slope(self, distance_m: ArrayLike) -> Floats:
         """dRSSI/dd [dB/m]: -10 n / (d ln 10), zero below the reference distance."""
         beyond = np.asarray(distance_m) >= self.reference_distance_m
         steepness = -10.0 * self.path_loss_exponent / math.log(10.0)
         return np.where(beyond, steepness / np.maximum(distance_m, self.reference_distance_m), 0.0)
 
-    def distance(self, reading: ArrayLike) -> Array:
+    def distance(self, reading: ArrayLike) -> Floats:
         """Distance [m] from RSSI [dBm], the inverse of eq. 3; never less than the reference distance."""
         exponent = (self.rssi_at_reference_dbm - np.asarray(reading)) / (10.0 * self.path_loss_exponent)
         return np.asarray(self.reference_distance_m * np.power(10.0, np.maximum(exponent, 0.0)))
@@ -126,7 +129,7 @@ class PathLoss:
         """Common error of the path-loss exponent."""
         return self.exponent_std
 
-    def by_gain(self, distance_m: ArrayLike) -> Array:
+    def by_gain(self, distance_m: ArrayLike) -> Floats:
         """dRSSI/dn [dB]: -10 log10(d / d0)."""
         ratio = np.maximum(distance_m, self.reference_distance_m) / self.reference_distance_m
         return np.asarray(-10.0 * np.log10(ratio))
@@ -152,15 +155,15 @@ class Ranging:
         """Common error of all ranges of the anchor [m]."""
         return self.bias_std_m
 
-    def expected(self, distance_m: ArrayLike) -> Array:
+    def expected(self, distance_m: ArrayLike) -> Floats:
         """Range [m] expected at ``distance_m``."""
         return np.asarray(self.scale * np.asarray(distance_m) + self.offset_m)
 
-    def slope(self, distance_m: ArrayLike) -> Array:
+    def slope(self, distance_m: ArrayLike) -> Floats:
         """The scale, whatever the distance."""
         return np.full_like(distance_m, self.scale, dtype=np.float64)
 
-    def distance(self, reading: ArrayLike) -> Array:
+    def distance(self, reading: ArrayLike) -> Floats:
         """Distance [m] behind a measured range; never less than zero."""
         return np.asarray(np.maximum((np.asarray(reading) - self.offset_m) / self.scale, 0.0))
 
@@ -174,6 +177,6 @@ class Ranging:
         """Common error of the scale."""
         return self.scale_std
 
-    def by_gain(self, distance_m: ArrayLike) -> Array:
+    def by_gain(self, distance_m: ArrayLike) -> Floats:
         """The distance itself."""
         return np.asarray(distance_m)

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fusion.arrays import Floats
 from fusion.radio import DistanceModel
 from fusion.values import Ranges, RssiReading, WifiScan
 from fusion.world import Anchor, World
@@ -23,7 +23,7 @@ class Expectation(NamedTuple):
     by_gain: float
 
 
-class Sighting(NamedTuple):
+class RadioReading(NamedTuple):
     """One reading of one anchor: value and variance in the reading's unit (dBm and dB^2, or m and m^2)."""
 
     anchor: Anchor
@@ -48,11 +48,11 @@ class Sighting(NamedTuple):
 
     def expected_values(
         self,
-        x: NDArray[np.float64],
-        y: NDArray[np.float64],
-        heading: NDArray[np.float64],
+        x: Floats,
+        y: Floats,
+        heading: Floats,
         antenna_m: tuple[float, float, float],
-    ) -> NDArray[np.float64]:
+    ) -> Floats:
         """`expect` over many poses at once, without derivatives; all arrays of one shape."""
         c, s = np.cos(heading), np.sin(heading)
         dx = x + c * antenna_m[0] - s * antenna_m[1] - self.anchor.x
@@ -60,19 +60,19 @@ class Sighting(NamedTuple):
         return self.model.expected(np.sqrt(dx * dx + dy * dy + (antenna_m[2] - self.anchor.z) ** 2))
 
 
-def sightings(world: World, scan: WifiScan | Ranges) -> tuple[Sighting, ...]:
-    """The readings of a screened scan as sightings, in the order of their anchors.
+def radio_readings(world: World, scan: WifiScan | Ranges) -> tuple[RadioReading, ...]:
+    """The readings of a screened scan whose anchors the world has, in their order.
 
-    A range's variance is the larger of the world's and the device's own claim: devices are optimists.
+    A range's variance is the larger of the world's and the device's own: devices are optimists.
     """
-    found: list[Sighting] = []
+    found: list[RadioReading] = []
     for reading in scan.readings:
         anchor = world.anchor(reading.anchor)
         if anchor is None:
             continue
         if isinstance(reading, RssiReading):
-            found.append(Sighting(anchor, anchor.radio, reading.rssi_dbm, anchor.radio.std**2))
+            found.append(RadioReading(anchor, anchor.radio, reading.rssi_dbm, anchor.radio.std**2))
         else:
             std = max(anchor.ranging.std, reading.std_m or 0.0)
-            found.append(Sighting(anchor, anchor.ranging, reading.range_m, std**2))
+            found.append(RadioReading(anchor, anchor.ranging, reading.range_m, std**2))
     return tuple(found)

@@ -82,3 +82,11 @@ def _read_table(kind: Any, value: object, where: str) -> dict[str, Any]:  # noqa
     if not isinstance(value, Mapping):
         raise WorldError(f"{where}: expected a table of names and values, got {value!r}")
     return {str(key): read_value(kind, item, f"{where}.{key}") for key, item in value.items()}
+
+
+def require_positive(record: object, keys: tuple[str, ...], where: str) -> None:
+    """Raises `WorldError` for the first of these numbers of ``record`` that is neither None nor greater than zero."""
+    for key in keys:
+        value = getattr(record, key)
+        if value is not None and value <= 0:
+            raise WorldError(f"{where}.{key}: {value} must be greater than zero")

@@ -10,14 +10,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fusion.arrays import Floats
 from fusion.errors import WorldError
 
 COLLINEAR_RATIO = 1e-3
 """Anchors count as collinear when their spread across the best line is below this share of their spread along it."""
-
-Array = NDArray[np.float64]
 
 
 class Fix(NamedTuple):
@@ -35,13 +33,13 @@ class Fix(NamedTuple):
         return ((self.xx, self.xy), (self.xy, self.yy))
 
 
-def are_collinear(anchors: Array) -> bool:
+def are_collinear(anchors: Floats) -> bool:
     """Whether the ``anchors`` (n, 2) [m] lie on one line (or point), which leaves two mirror images of every fix."""
     spread = np.linalg.svd(anchors - anchors.mean(axis=0), compute_uv=False)
     return bool(spread[-1] <= COLLINEAR_RATIO * spread[0])
 
 
-def closed_form(anchors: Array, distances: Array) -> tuple[float, float]:
+def closed_form(anchors: Floats, distances: Floats) -> tuple[float, float]:
     """The paper's fix (eqs. 1 and 2) from exactly three ``anchors`` (3, 2) [m] and ``distances`` (3,) [m].
 
     Raises `WorldError` for collinear anchors. (Eq. 2 is printed with both rows of its quotient swapped, which cancels.)
@@ -58,7 +56,7 @@ def closed_form(anchors: Array, distances: Array) -> tuple[float, float]:
     return x, y
 
 
-def linear_least_squares(anchors: Array, distances: Array) -> tuple[float, float]:
+def linear_least_squares(anchors: Floats, distances: Floats) -> tuple[float, float]:
     """The fix that subtracting the mean circle leaves, in one linear solve; ``anchors`` (n, 2), n >= 3."""
     centred = anchors - anchors.mean(axis=0)
     squares = (anchors**2).sum(axis=1) - distances**2
@@ -66,7 +64,7 @@ def linear_least_squares(anchors: Array, distances: Array) -> tuple[float, float
     return float(solution[0]), float(solution[1])
 
 
-def least_squares(anchors: Array, distances: Array, stds: Array, *, iterations: int = 10) -> tuple[float, float]:
+def least_squares(anchors: Floats, distances: Floats, stds: Floats, *, iterations: int = 10) -> tuple[float, float]:
     """The fix of least weighted squared distance errors, by damped Gauss-Newton; shapes (n, 2), (n,), (n,)."""
     position = np.array(linear_least_squares(anchors, distances))
     cost = _cost(anchors, distances, stds, position)
@@ -83,12 +81,12 @@ def least_squares(anchors: Array, distances: Array, stds: Array, *, iterations: 
     return float(position[0]), float(position[1])
 
 
-def _cost(anchors: Array, distances: Array, stds: Array, position: Array) -> float:
+def _cost(anchors: Floats, distances: Floats, stds: Floats, position: Floats) -> float:
     computed = np.hypot(*(position - anchors).T)
     return float((((distances - computed) / stds) ** 2).sum())
 
 
-def trilaterate(anchors: Array, distances: Array, stds: Array) -> Fix:
+def trilaterate(anchors: Floats, distances: Floats, stds: Floats) -> Fix:
     """A fix from ``anchors`` (n, 2), ``distances`` (n,) and their ``stds`` (n,), all [m], n >= 3 and not collinear."""
     if len(anchors) == 3:
         x, y = closed_form(anchors, distances)
@@ -99,7 +97,7 @@ def trilaterate(anchors: Array, distances: Array, stds: Array) -> Fix:
     return Fix(x, y, float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1]))
 
 
-def _closed_form_covariance(anchors: Array, distances: Array, stds: Array) -> Array:
+def _closed_form_covariance(anchors: Floats, distances: Floats, stds: Floats) -> Floats:
     """Distance errors carried through the two lines A p = b(d) of the closed form: A^-1 D R Dᵀ A^-T, D = db/dd."""
     lines = 2.0 * np.diff(anchors, axis=0)
     d1, d2, d3 = (2.0 * distances).tolist()
@@ -107,7 +105,7 @@ def _closed_form_covariance(anchors: Array, distances: Array, stds: Array) -> Ar
     return np.asarray(by_distance * stds**2 @ by_distance.T)
 
 
-def _least_squares_covariance(anchors: Array, position: Array, stds: Array) -> Array:
+def _least_squares_covariance(anchors: Floats, position: Floats, stds: Floats) -> Floats:
     """(Hᵀ R^-1 H)^-1 at ``position``, H the unit vectors from the anchors."""
     away = position - anchors
     directions = away / np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)[:, None]

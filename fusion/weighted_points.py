@@ -10,18 +10,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fusion.arrays import Floats
 from fusion.geometry import Covariance, Pose, wrap_angle
 from fusion.motion import Increment
-
-Array = NDArray[np.float64]
 
 OUTLIER_WIDTH = 20.0
 """Width of the uniform part of the mixture, in standard deviations of the reading."""
 
 
-def square_root(covariance: Array) -> Array:
+def square_root(covariance: Floats) -> Floats:
     """The symmetric square root of a positive semi-definite matrix (n, n); singular ones are welcome, and turning the
     frame turns the root with it, which Cholesky's factor does not.
     """
@@ -29,7 +27,7 @@ def square_root(covariance: Array) -> Array:
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
-def mixture(residual: Array, variance: Array | float, outlier_share: float) -> tuple[Array, Array]:
+def mixture(residual: Floats, variance: Floats | float, outlier_share: float) -> tuple[Floats, Floats]:
     """Likelihood of each residual up to a constant, and the probability that it is no outlier; any shape."""
     std = np.sqrt(variance)
     good = (1.0 - outlier_share) / math.sqrt(math.tau) * np.exp(-0.5 * np.square(residual / std)) / std
@@ -37,7 +35,7 @@ def mixture(residual: Array, variance: Array | float, outlier_share: float) -> t
     return likelihood, good / likelihood
 
 
-def moments(weights: Array, x: Array, y: Array, heading: Array) -> tuple[Pose, Covariance]:
+def moments(weights: Floats, x: Floats, y: Floats, heading: Floats) -> tuple[Pose, Covariance]:
     """Weighted mean pose and covariance of points whose shapes broadcast to that of ``weights``. The heading's mean is
     circular (Mardia & Jupp 2000, section 2.2), and its deviations are wrapped.
     """
@@ -49,7 +47,7 @@ def moments(weights: Array, x: Array, y: Array, heading: Array) -> tuple[Pose, C
     return Pose(mean_x, mean_y, wrap_angle(mean_heading)), spread
 
 
-def carried(x: Array, y: Array, heading: Array, motion: Increment) -> tuple[Array, Array]:
+def carried(x: Floats, y: Floats, heading: Floats, motion: Increment) -> tuple[Floats, Floats]:
     """Where points at (x, y) with ``heading`` come to by ``motion``, each in its own direction."""
     c, s = np.cos(heading), np.sin(heading)
     return x + c * motion.x - s * motion.y, y + s * motion.x + c * motion.y

@@ -7,7 +7,6 @@ Unknown keys are refused with the nearest match; anchors that make positioning i
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,14 +15,11 @@ from typing import Any
 import numpy as np
 
 from fusion.errors import WorldError
-from fusion.radio import PathLoss, Ranging
-from fusion.schema import check_keys, read_record, read_value
+from fusion.radio import DistanceModel, PathLoss, RadioKind, Ranging
+from fusion.robot import Robot, read_robot
+from fusion.schema import check_keys, read_record, read_value, require_positive
 from fusion.trilateration import are_collinear
 
-DRIVES = {"differential": 2, "skid_steer": 4, "none": 0}
-"""Kinds of drive and their wheels: left, right; front left, front right, rear left, rear right."""
-ENCODERS = ("quadrature", "single_channel")
-TURN_SOURCES = ("wheels", "gyro")
 FLOOR_MARGIN_M = 2.0
 """Floor assumed beyond the outermost anchors when the world states no bounds."""
 
@@ -39,58 +35,9 @@ class Anchor:
     radio: PathLoss
     ranging: Ranging
 
-
-@dataclass(frozen=True, slots=True)
-class OdometryNoise:
-    """How far odometry strays: white noise whose variance grows with path, turn and time, whatever the message rate
-    (after Thrun, Burgard & Fox 2005, table 5.6), and the calibration errors that stay the same for a whole run.
-    """
-
-    distance_std_per_sqrt_m: float = 0.02
-    distance_std_per_sqrt_s: float = 0.002
-    side_std_per_sqrt_m: float = 0.01
-    turn_std_per_sqrt_rad: float = 0.03
-    turn_std_per_sqrt_m: float = 0.01
-    turn_std_per_sqrt_s: float = 0.005
-    distance_scale_std: float = 0.02
-    turn_scale_std: float = 0.02
-    turn_bias_std_rad_s: float = 0.002
-    drift_std_per_sqrt_s: float = 0.5
-    """Position noise [m/sqrt(s)] while nothing measures the motion: no odometry, or odometry that fell silent."""
-    turn_drift_std_per_sqrt_s: float = 0.5
-    """The same for the heading [rad/sqrt(s)]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Robot:
-    """Wheels, encoders, gyro and antenna of the robot. The defaults are those of the paper's robot: four wheels,
-    20 ticks a revolution, 1.02 cm a tick (Moro & Mehrpouyan 2019, section II).
-    """
-
-    drive: str = "skid_steer"
-    encoder: str = "quadrature"
-    ticks_per_revolution: int = 20
-    wheel_circumference_m: float = 0.204
-    track_width_m: float = 0.15
-    distance_scale: float = 1.0
-    distance_offset_m: float = 0.0
-    diameter_ratio: float = 1.0
-    """Right wheels over left, the mean of both kept: E_d of Borenstein & Feng (1996)."""
-    turn_source: str = "wheels"
-    gyro_bias_rad_s: float = 0.0
-    gyro_scale: float = 1.0
-    antenna_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    noise: OdometryNoise = field(default_factory=OdometryNoise)
-
-    @property
-    def distance_per_tick_m(self) -> float:
-        """Distance a wheel rolls from one tick to the next [m]."""
-        return self.wheel_circumference_m / self.ticks_per_revolution
-
-    @property
-    def side_scales(self) -> tuple[float, float]:
-        """Factors of the left and the right wheels' roll, whose mean is one (Borenstein & Feng 1996, eqs. 17, 18)."""
-        return 2.0 / (1.0 + self.diameter_ratio), 2.0 * self.diameter_ratio / (1.0 + self.diameter_ratio)
+    def model(self, kind: RadioKind) -> DistanceModel:
+        """The dependence of readings of that kind on distance."""
+        return self.radio if kind == "rssi" else self.ranging
 
 
 POSITIVE_RADIO = "frequency_hz", "path_loss_exponent", "reference_distance_m", "shadowing_std_db", "shadowing_length_m"
@@ -171,8 +118,7 @@ class World:
 
         known = {"name", "provenance", "anchors", "radio", "ranging", "robot", "bounds", "walls", "calibration"}
         check_keys(table, dict.fromkeys(known), "world")
-        robot = read_record(Robot, table.get("robot", {}), "robot")
-        _check_robot(robot)
+        robot = read_robot(table.get("robot", {}))
         read_record(PathLoss, table.get("radio", {}), "radio")
         read_record(Ranging, table.get("ranging", {}), "ranging")
         anchors = _read_anchors(table, robot.antenna_m[2])
@@ -232,7 +178,7 @@ def _read_anchor(row: Any, world: Mapping[str, Any], antenna_height_m: float, wh
         ("radio", anchor.radio, POSITIVE_RADIO),
         ("ranging", anchor.ranging, ("scale", "std_m")),
     ):
-        _require_positive(model, keys, f"{where}.{name}")
+        require_positive(model, keys, f"{where}.{name}")
     return anchor
 
 
@@ -242,13 +188,6 @@ def _own(row: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
     if not isinstance(table, Mapping):
         raise WorldError(f"{where}.{key}: expected a table of names and values, got {table!r}")
     return table
-
-
-def _require_positive(record: object, keys: tuple[str, ...], where: str) -> None:
-    for key in keys:
-        value = getattr(record, key)
-        if value is not None and value <= 0:
-            raise WorldError(f"{where}.{key}: {value} must be greater than zero")
 
 
 def _check_anchors(anchors: tuple[Anchor, ...]) -> None:
@@ -264,27 +203,6 @@ def _check_anchors(anchors: tuple[Anchor, ...]) -> None:
     if len(anchors) >= 3 and are_collinear(np.array([[anchor.x, anchor.y] for anchor in anchors])):
         ids = ", ".join(anchor.id for anchor in anchors)
         raise WorldError(f"anchors: {ids} lie on one line, so left and right of it look alike; move one off the line")
-
-
-def _check_robot(robot: Robot) -> None:
-    for key, allowed in (("drive", DRIVES), ("encoder", ENCODERS), ("turn_source", TURN_SOURCES)):
-        if getattr(robot, key) not in allowed:
-            raise WorldError(f"robot.{key}: {getattr(robot, key)!r} is none of {', '.join(allowed)}")
-    _require_positive(
-        robot,
-        (
-            "ticks_per_revolution",
-            "wheel_circumference_m",
-            "track_width_m",
-            "distance_scale",
-            "diameter_ratio",
-            "gyro_scale",
-        ),
-        "robot",
-    )
-    for key in (item.name for item in dataclasses.fields(robot.noise)):
-        if getattr(robot.noise, key) < 0:
-            raise WorldError(f"robot.noise.{key}: {getattr(robot.noise, key)} must not be negative")
 
 
 def _read_bounds(table: Mapping[str, Any], anchors: tuple[Anchor, ...]) -> Bounds:

@@ -34,46 +34,6 @@ from fusion import (
 from fusion.values import NANOSECONDS
 from logs.cdr import Packer, Unpacker
 
-SEPARATOR = "=" * 80 + "\n"
-TIME = SEPARATOR + "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
-STAMPED = SEPARATOR + "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" + TIME
-VECTOR = SEPARATOR + "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
-QUATERNION = SEPARATOR + "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
-POINT = SEPARATOR + "MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n"
-POSE = SEPARATOR + "MSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n" + POINT + QUATERNION
-
-SCHEMAS = {
-    "fusion_msgs/msg/WheelTicks": "# cumulative encoder counts, in the wheel order of the world\n"
-    "std_msgs/Header header\nint64[] counts\n" + STAMPED,
-    "fusion_msgs/msg/MotorCommand": "# signed wheel speeds [m/s]\n"
-    "std_msgs/Header header\nfloat64[] wheel_speeds_m_s\n" + STAMPED,
-    "fusion_msgs/msg/OdometryIncrement": "# motion over (from_ns, stamp]\nstd_msgs/Header header\n"
-    "int64 from_ns\nfloat64 distance_m\nfloat64 turn_rad\nbool measured\n" + STAMPED,
-    "fusion_msgs/msg/WifiScan": "std_msgs/Header header\nRssiReading[] readings\n" + STAMPED + SEPARATOR
-    + "MSG: fusion_msgs/RssiReading\nstring anchor\nfloat64 rssi_dbm\nint64 age_ns\n",
-    "fusion_msgs/msg/Ranges": "# std_m NaN: the device claims none\n"
-    "std_msgs/Header header\nRangeReading[] readings\n" + STAMPED + SEPARATOR
-    + "MSG: fusion_msgs/RangeReading\nstring anchor\nfloat64 range_m\nfloat64 std_m\n",
-    "fusion_msgs/msg/Fates": "# what became of each reading of one measurement; NaN: no such number\n"
-    "std_msgs/Header header\nFate[] fates\n" + STAMPED + SEPARATOR
-    + "MSG: fusion_msgs/Fate\nstring anchor\nstring decision\nstring reason\nfloat64 weight\nfloat64 innovation\n"
-    "float64 innovation_variance\nfloat64 nis\n",
-    "fusion_msgs/msg/ClockSync": "# the clocks of one computer at one moment; all stamps are boot_ns\n"
-    "std_msgs/Header header\nint64 boot_ns\nint64 monotonic_ns\nint64 real_ns\nbool ntp_synced\n" + STAMPED,
-    "diagnostic_msgs/msg/DiagnosticArray": "std_msgs/Header header\nDiagnosticStatus[] status\n" + STAMPED + SEPARATOR
-    + "MSG: diagnostic_msgs/DiagnosticStatus\nbyte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\nbyte level\n"
-    "string name\nstring message\nstring hardware_id\nKeyValue[] values\n" + SEPARATOR
-    + "MSG: diagnostic_msgs/KeyValue\nstring key\nstring value\n",
-    "sensor_msgs/msg/Imu": "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\n"
-    "float64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\n"
-    "float64[9] angular_velocity_covariance\ngeometry_msgs/Vector3 linear_acceleration\n"
-    "float64[9] linear_acceleration_covariance\n" + STAMPED + QUATERNION + VECTOR,
-    "geometry_msgs/msg/PoseStamped": "std_msgs/Header header\nPose pose\n" + STAMPED + POSE,
-    "geometry_msgs/msg/PoseWithCovarianceStamped": "std_msgs/Header header\nPoseWithCovariance pose\n" + STAMPED
-    + SEPARATOR + "MSG: geometry_msgs/PoseWithCovariance\nPose pose\nfloat64[36] covariance\n" + POSE,
-}  # fmt: skip
-"""Definition texts by type name, as the MCAP schema encoding `ros2msg` wants them."""
-
 MAP = "map"
 NOT_GIVEN = -1.0
 """First element of a covariance that says there is none (the convention of sensor_msgs/Imu)."""
@@ -228,8 +188,8 @@ def _decode_ranges(data: bytes, seq: int) -> Ranges:
     return Ranges(time_ns, sensor, seq, tuple(readings))
 
 
-class Kind(NamedTuple):
-    """How one type of measurement is stored: topic, message type and both directions."""
+class Codec(NamedTuple):
+    """Topic, message type, encoder and decoder of one type of measurement."""
 
     topic: str
     schema: str
@@ -237,17 +197,17 @@ class Kind(NamedTuple):
     decode: Callable[[bytes, int], Measurement]
 
 
-KINDS: dict[type, Kind] = {
-    WheelTicks: Kind("/wheel/ticks", "fusion_msgs/msg/WheelTicks", _encode_ticks, _decode_ticks),
-    MotorCommand: Kind("/wheel/command", "fusion_msgs/msg/MotorCommand", _encode_command, _decode_command),
-    Odometry: Kind("/wheel/odometry", "fusion_msgs/msg/OdometryIncrement", _encode_odometry, _decode_odometry),
-    Gyro: Kind("/imu/raw", "sensor_msgs/msg/Imu", _encode_gyro, _decode_gyro),
-    WifiScan: Kind("/wifi/scan", "fusion_msgs/msg/WifiScan", _encode_scan, _decode_scan),
-    Ranges: Kind("/ranges", "fusion_msgs/msg/Ranges", _encode_ranges, _decode_ranges),
+CODECS: dict[type, Codec] = {
+    WheelTicks: Codec("/wheel/ticks", "fusion_msgs/msg/WheelTicks", _encode_ticks, _decode_ticks),
+    MotorCommand: Codec("/wheel/command", "fusion_msgs/msg/MotorCommand", _encode_command, _decode_command),
+    Odometry: Codec("/wheel/odometry", "fusion_msgs/msg/OdometryIncrement", _encode_odometry, _decode_odometry),
+    Gyro: Codec("/imu/raw", "sensor_msgs/msg/Imu", _encode_gyro, _decode_gyro),
+    WifiScan: Codec("/wifi/scan", "fusion_msgs/msg/WifiScan", _encode_scan, _decode_scan),
+    Ranges: Codec("/ranges", "fusion_msgs/msg/Ranges", _encode_ranges, _decode_ranges),
 }
 TRUTH = ("/ground_truth", "geometry_msgs/msg/PoseStamped")
-DECODERS = {kind.schema: kind.decode for kind in KINDS.values()}
-"""How a message of one of our types becomes a measurement again, whatever its topic."""
+DECODERS = {codec.schema: codec.decode for codec in CODECS.values()}
+"""Decoders by message type, whatever the topic."""
 PRIOR = ("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped")
 ESTIMATE_TOPIC = "/estimate/"
 FATES_TOPIC = "/fates/"

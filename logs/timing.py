@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fusion.arrays import Stamps, Whole
 from fusion.values import nanoseconds, seconds
 
 GAP_PERIODS = 3
@@ -24,9 +24,9 @@ JUMP_MESSAGES = 10
 class Stream(NamedTuple):
     """The messages of one sensor in the order they stand in the file: stamps and log times [ns], numbers, each (n,)."""
 
-    stamps: NDArray[np.int64]
-    arrivals: NDArray[np.int64]
-    numbers: NDArray[np.int64]
+    stamps: Stamps
+    arrivals: Stamps
+    numbers: Whole
 
     def timing(self, start_ns: int) -> dict[str, Any]:
         """What is known of it, as plain values: [s] and [Hz], places in seconds after ``start_ns``."""
@@ -54,7 +54,7 @@ class Stream(NamedTuple):
         }
 
     @property
-    def _late(self) -> NDArray[np.int64]:
+    def _late(self) -> Whole:
         """Delay of each message [ns]."""
         return self.arrivals - self.stamps
 

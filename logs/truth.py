@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fusion import Truth
-from fusion.arrays import Flags, Floats, Points, Whole, points
+from fusion.arrays import Flags, Floats, Points, Stamps, Whole, points
 from fusion.values import nanoseconds
 
 
@@ -19,15 +19,15 @@ from fusion.values import nanoseconds
 class TruthTrack:
     """Ground truth as columns of one length n, in time order: time [ns], x, y [m], heading [rad] (NaN: not known)."""
 
-    time_ns: NDArray[np.int64]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    heading: NDArray[np.float64]
+    time_ns: Stamps
+    x: Floats
+    y: Floats
+    heading: Floats
 
     def __len__(self) -> int:
         return len(self.time_ns)
 
-    def at(self, rows: NDArray[np.bool_]) -> TruthTrack:
+    def at(self, rows: Flags) -> TruthTrack:
         """Some of it, by mask."""
         return TruthTrack(self.time_ns[rows], self.x[rows], self.y[rows], self.heading[rows])
 

@@ -11,9 +11,9 @@ import math
 from collections.abc import Collection, Iterable
 
 from fusion import Advice, Diagnostic, DriverOutput, Measurement, MotorCommand, Truth, WheelTicks
+from fusion.robot import WHEELS, Robot
 from fusion.timeline import order
 from fusion.values import seconds
-from fusion.world import DRIVES, Robot
 from logs.devices import is_down
 
 LEAST_M = 0.1
@@ -66,7 +66,7 @@ class DirectionWatch:
     """
 
     def __init__(self, robot: Robot) -> None:
-        wheels = DRIVES[robot.drive]
+        wheels = len(WHEELS[robot.drive])
         self._robot = robot
         self._commanders: set[str] = set()
         self._is_known = [False] * wheels

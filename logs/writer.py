@@ -24,7 +24,8 @@ from fusion import Diagnostic, LogError, Measurement, PluginError, Prior, Truth,
 from fusion.values import nanoseconds
 from logs import device_messages, messages
 from logs.device_messages import ClockSync
-from logs.messages import ESTIMATE_TOPIC, FATES_TOPIC, KINDS, SCHEMAS
+from logs.messages import CODECS, ESTIMATE_TOPIC, FATES_TOPIC
+from logs.schemas import SCHEMAS
 
 RUN_RECORD = "fusion"
 """Name of the metadata record that makes an MCAP file one of ours."""
@@ -71,17 +72,17 @@ class RunWriter:
         self._writer.add_attachment(0, 0, "world.json", "application/json", world.table.encode())
         for title, content in attachments.items():
             self._writer.add_attachment(0, 0, title, "application/octet-stream", content)
-        for kind in KINDS.values():
-            self._channel(kind.topic, kind.schema)
+        for codec in CODECS.values():
+            self._channel(codec.topic, codec.schema)
         self._channel(*messages.TRUTH)
         if prior is not None:
             self._add(*messages.PRIOR, prior.time_ns, prior.time_ns, 0, start)
 
     def write(self, measurement: Measurement, *, log_time_ns: int | None = None) -> None:
         """Append a measurement; ``log_time_ns`` says when it arrived, if not when it was true."""
-        kind = KINDS[type(measurement)]
+        codec = CODECS[type(measurement)]
         log_ns = measurement.time_ns if log_time_ns is None else log_time_ns
-        self._add(kind.topic, kind.schema, log_ns, measurement.time_ns, measurement.seq, kind.encode(measurement))
+        self._add(codec.topic, codec.schema, log_ns, measurement.time_ns, measurement.seq, codec.encode(measurement))
 
     def write_truth(self, truth: Truth, *, log_time_ns: int | None = None) -> None:
         """Append where the robot really was; ``log_time_ns`` says when that arrived, if not when it was true."""

@@ -8,7 +8,6 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import get_args
 
-from benchmarks.limits.fix_bound import Radio
 from benchmarks.limits.floor_picture import draw
 from benchmarks.limits.floor_plan import LIMIT_M, plan_site
 from benchmarks.limits.floor_tables import sheets, write_record
@@ -16,12 +15,15 @@ from fusion.cli.arguments import at_least_one
 from fusion.output.figures import require_matplotlib
 from fusion.output.progress import progress_bar
 from fusion.output.tables import print_sheets
+from fusion.radio import RadioKind
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion bound``."""
     parser.add_argument("site", metavar="WORLD", help="a world or scenario file, a log, or a built-in scenario")
-    parser.add_argument("--radio", choices=get_args(Radio), help="the kind of readings; default: the one in use there")
+    parser.add_argument(
+        "--radio", choices=get_args(RadioKind), help="the kind of readings; default: the one in use there"
+    )
     parser.add_argument("--scans", type=at_least_one, default=1, metavar="N", help="readings of each anchor in one fix")
     parser.add_argument("--step", type=float, metavar="M", help="size of the floor's cells; by default some thousands")
     parser.add_argument("--limit", type=float, default=LIMIT_M, metavar="M", help="tell the share of floor below it")

@@ -13,14 +13,8 @@ from benchmarks.faults.fault import Fault
 from benchmarks.faults.row_selection import Windows
 from benchmarks.faults.run_columns import RunColumns
 from fusion import ParameterError, Pose, wrap_angle
+from fusion.robot import WHEELS
 from logs.prior import starting_prior
-
-WHEELS = {
-    "differential": ("left", "right"),
-    "skid_steer": ("front_left", "front_right", "rear_left", "rear_right"),
-    "none": (),
-}
-"""Names of the wheels of each drive, in their order (`fusion.world.DRIVES`)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,9 +27,9 @@ from fusion import (
     WifiScan,
 )
 from fusion.odometry import wheel_increment
+from fusion.robot import WHEELS
 from fusion.timeline import order as place
 from fusion.values import NANOSECONDS
-from fusion.world import DRIVES
 from logs.prior import begin_ns
 from logs.run import Run
 
@@ -50,7 +50,7 @@ class RunColumns:
         # A log keeps the order of arrival, not its times: a message was there once the newest before it was.
         self.arrival_ns = np.maximum.accumulate(self.stamp_ns)
         self.rate_rad_s = np.array([m.rate_rad_s if isinstance(m, Gyro) else 0.0 for m in measured], dtype=np.float64)
-        self.roll = np.ones((len(measured), DRIVES[run.world.robot.drive] or 2))
+        self.roll = np.ones((len(measured), len(WHEELS[run.world.robot.drive]) or 2))
         self.messages = self._rows(
             [TOPICS[type(m)] for m in measured], [m.sensor for m in measured], np.arange(len(measured))
         )

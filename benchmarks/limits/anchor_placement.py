@@ -18,7 +18,6 @@ from benchmarks.limits.fix_bound import (
     AS_TOLD,
     Floats,
     Places,
-    Radio,
     Shared,
     anchor_information,
     fix_covariance,
@@ -27,7 +26,7 @@ from benchmarks.limits.fix_bound import (
 from fusion import Anchor, Bounds, World
 from fusion.output.progress import Progress
 from fusion.quantiles import quantile
-from fusion.radio import PathLoss, Ranging
+from fusion.radio import PathLoss, RadioKind, Ranging
 from fusion.schema import read_record
 from fusion.trilateration import are_collinear
 
@@ -42,7 +41,7 @@ NEW = "new"
 class Readings(NamedTuple):
     """What a fix is made from: ``scans`` readings of every anchor, all of one kind, from one place."""
 
-    radio: Radio
+    radio: RadioKind
     scans: int = 1
     shared: Shared = AS_TOLD
 

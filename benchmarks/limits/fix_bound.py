@@ -15,16 +15,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fusion import Anchor, World
-from fusion.radio import DistanceModel
+from fusion.radio import RadioKind
 
 Floats = NDArray[np.float64]
-Radio = Literal["rssi", "range"]
 
 POSITION, OFFSET, GAIN = slice(0, 2), 2, 3
 """Rows and columns of an information matrix."""
@@ -61,13 +60,8 @@ AS_TOLD = Shared()
 """No common offset, and the gain as well known as the world says."""
 
 
-def model_of(anchor: Anchor, radio: Radio) -> DistanceModel:
-    """How that kind of reading depends on the distance to ``anchor``."""
-    return anchor.radio if radio == "rssi" else anchor.ranging
-
-
 def anchor_information(
-    anchors: Sequence[Anchor], places: Places, radio: Radio, *, scans: int = 1, shared: Shared = AS_TOLD
+    anchors: Sequence[Anchor], places: Places, radio: RadioKind, *, scans: int = 1, shared: Shared = AS_TOLD
 ) -> Floats:
     """What ``scans`` readings of each anchor, all from one place, say: (m, ..., 4, 4), to be summed over anchors.
 
@@ -75,7 +69,7 @@ def anchor_information(
     """
     found = np.empty((len(anchors), *np.shape(places.x), 4, 4))
     for own, anchor in zip(found, anchors, strict=True):
-        model, (ux, uy, distance) = model_of(anchor, radio), _sight(anchor, places)
+        model, (ux, uy, distance) = anchor.model(radio), _sight(anchor, places)
         slope = model.slope(distance)
         gain_std = model.gain_std if shared.gain_std is None else shared.gain_std
         offset = np.full_like(distance, _unit(shared.offset_std))
@@ -131,7 +125,7 @@ def _inverse(matrix: Floats, scale: Floats) -> Floats:
 
 
 def fix_error(
-    anchors: Sequence[Anchor], places: Places, radio: Radio, *, scans: int = 1, shared: Shared = AS_TOLD
+    anchors: Sequence[Anchor], places: Places, radio: RadioKind, *, scans: int = 1, shared: Shared = AS_TOLD
 ) -> Floats:
     """Least root mean square error (...) [m] of an unbiased fix: the root of the trace of `fix_covariance`."""
     information = anchor_information(anchors, places, radio, scans=scans, shared=shared).sum(axis=0)

@@ -20,10 +20,11 @@ from benchmarks.limits.anchor_placement import (
     error_map,
     losses,
 )
-from benchmarks.limits.fix_bound import Floats, Radio, Shared, dilution
+from benchmarks.limits.fix_bound import Floats, Shared, dilution
 from benchmarks.limits.floor_source import choose_radio, load_site
 from fusion import Anchor, ParameterError, World, WorldError
 from fusion.output.progress import Progress
+from fusion.radio import RadioKind
 from fusion.trilateration import are_collinear
 
 LIMIT_M = 1.0
@@ -76,7 +77,7 @@ def title(plan: Plan) -> str:
 def plan_site(
     source: str | Path,
     *,
-    radio: Radio | None = None,
+    radio: RadioKind | None = None,
     scans: int = 1,
     step_m: float | None = None,
     limit_m: float = LIMIT_M,

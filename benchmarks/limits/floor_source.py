@@ -7,8 +7,8 @@ import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.limits.fix_bound import Radio
 from fusion import Ranges, WifiScan, World
+from fusion.radio import RadioKind
 from logs.reader import read_run
 from sensors.simulation.scenario import load_scenario
 
@@ -17,7 +17,7 @@ class Site(NamedTuple):
     """A world, and which radios are in use there; none where its source says nothing of that."""
 
     world: World
-    radios: frozenset[Radio]
+    radios: frozenset[RadioKind]
 
 
 def load_site(source: str | Path) -> Site:
@@ -45,12 +45,12 @@ def _is_scenario(path: Path) -> bool:
         return False
 
 
-def _radios(rssi: float, ranges: float) -> frozenset[Radio]:
-    found: list[tuple[Radio, float]] = [("rssi", rssi), ("range", ranges)]
+def _radios(rssi: float, ranges: float) -> frozenset[RadioKind]:
+    found: list[tuple[RadioKind, float]] = [("rssi", rssi), ("range", ranges)]
     return frozenset(radio for radio, used in found if used)
 
 
-def choose_radio(radios: frozenset[Radio]) -> tuple[Radio, str]:
+def choose_radio(radios: frozenset[RadioKind]) -> tuple[RadioKind, str]:
     """The one radio in use, or else signal strength; and the sentence that says so."""
     if len(radios) == 1:
         (radio,) = radios

@@ -32,7 +32,7 @@ from fusion import (
     Tracker,
     World,
     move,
-    sightings,
+    radio_readings,
 )
 from fusion.belief import starting_belief
 from fusion.timeline import order
@@ -135,14 +135,14 @@ class AtTruth:
         """Compose the motion, and add the scan's information."""
         time_ns = motion.time_ns if scan is None else scan.time_ns
         covariance, (x, y, heading) = self._moved(state, motion, time_ns), self._pose(time_ns)
-        for sighting in () if scan is None else sightings(self._world, scan):
-            expected, kind = sighting.expect(x, y, heading, self._world.robot.antenna_m), type(sighting.model)
+        for reading in () if scan is None else radio_readings(self._world, scan):
+            expected, kind = reading.expect(x, y, heading, self._world.robot.antenna_m), type(reading.model)
             row = np.zeros(len(covariance))
             row[POSE] = expected.by_x, expected.by_y, expected.by_heading
             row[self._gain_index[kind]] = expected.by_gain
-            row[self._bias_index[sighting.anchor.id, kind]] = 1.0
+            row[self._bias_index[reading.anchor.id, kind]] = 1.0
             column = covariance @ row
-            covariance = covariance - np.outer(column, column / (float(row @ column) + sighting.variance))
+            covariance = covariance - np.outer(column, column / (float(row @ column) + reading.variance))
         return State(time_ns, covariance), ()
 
     def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:

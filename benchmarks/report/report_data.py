@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.limits.fix_bound import Places, Radio, fix_error
+from benchmarks.limits.fix_bound import Places, fix_error
 from benchmarks.metrics.catalogue import RANKED_BY, unit_of
 from benchmarks.metrics.errors import Errors, errors
 from benchmarks.metrics.fates import FateColumns
@@ -24,6 +24,7 @@ from benchmarks.runner.timing import read_timing
 from benchmarks.statistics.verdict import Comparison
 from fusion import ParameterError, Ranges
 from fusion.arrays import Floats
+from fusion.radio import RadioKind
 from fusion.values import NANOSECONDS
 from logs.prior import begin_ns
 from logs.run import Run
@@ -59,7 +60,7 @@ class Series(NamedTuple):
         return np.where(self.answers.valid, away, np.inf)
 
 
-def radio_of(run: Run) -> Radio:
+def radio_of(run: Run) -> RadioKind:
     """What a fix of this run is made of: ranges, where it has any."""
     return "range" if any(isinstance(measurement, Ranges) for measurement in run.measurements) else "rssi"
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.limits.fix_bound import Places, model_of
+from benchmarks.limits.fix_bound import Places
 from benchmarks.metrics.matching import MAX_AGE_S
 from fusion import Anchor, Decision, RangeReading, Ranges, Reason, RssiReading, Update, WifiScan, World
 from fusion.arrays import Floats
@@ -99,7 +99,7 @@ def _readings_off(
 def _off(anchor: Anchor, reading: RssiReading | RangeReading, places: Places, i: int) -> tuple[float, float]:
     """How much farther [m] than the ``i``-th place a reading is, and how many standard deviations above its due."""
     is_range = isinstance(reading, RangeReading)
-    model, value = model_of(anchor, "range" if is_range else "rssi"), reading[1]
+    model, value = anchor.model("range" if is_range else "rssi"), reading[1]
     offset = (places.x[i] - anchor.x, places.y[i] - anchor.y, places.height - anchor.z)
     distance_m = math.hypot(*offset)
     std = math.hypot(model.std, model.bias_std, model.gain_std * float(model.by_gain(distance_m)))

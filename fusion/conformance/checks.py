@@ -1,7 +1,7 @@
 """The conformance kit: an estimator class held against every promise of the contract.
 
 `checks` yields those that apply to a class, for pytest; `run_checks` runs them by name and answers with verdicts. The
-promises themselves are in `fusion.conformance.estimator_promises`. Both treat ours and strangers' estimators alike.
+promises stand in modules of their own, by what they are about. Both treat ours and strangers' estimators alike.
 """
 
 from __future__ import annotations
@@ -10,9 +10,19 @@ from collections.abc import Iterator, Mapping
 from enum import Enum, unique
 from typing import Any, NamedTuple
 
-from fusion.conformance.estimator_promises import PROMISES, Promise
+from fusion.conformance import answer_promises, motion_promises, purity_promises, robustness_promises, time_promises
+from fusion.conformance.promise import Promise
 from fusion.errors import ConformanceError, ParameterError, did_you_mean
 from fusion.plugins import load
+
+PROMISES: list[Promise] = [
+    *purity_promises.PROMISES,
+    *answer_promises.PROMISES,
+    *time_promises.PROMISES,
+    *motion_promises.PROMISES,
+    *robustness_promises.PROMISES,
+]
+"""Every promise of an estimator, in the order in which verdicts are listed."""
 
 
 class Check(NamedTuple):

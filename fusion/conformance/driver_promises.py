@@ -9,16 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NamedTuple, TypeAlias, cast
+from typing import Any, NamedTuple, cast
 
 from fusion.conformance.checks import Outcome, Verdict
+from fusion.conformance.promise import require
 from fusion.driver import BootClock, DeviceInfo, Diagnostic, Driver, DriverOutput, DriverSpec, FakeDevice, Found, Level
 from fusion.errors import ConformanceError, DependencyError, DeviceLostError, DriverError, SettingError
 from fusion.plugins import SENSORS, load
 from fusion.values import Truth, seconds
 
-Kind: TypeAlias = type[Any]
-"""A driver class."""
 NAME = "sensor-under-test"
 TRIES = 50
 """Polls after which a device that spoke must have been heard."""
@@ -32,15 +31,15 @@ class DriverPromise(NamedTuple):
 
     id: str
     reason: str
-    test: Callable[[Kind], None]
+    test: Callable[[type[Any]], None]
     plays: bool
 
 
 DRIVER_PROMISES: list[DriverPromise] = []
 
 
-def _promise(promise_id: str, reason: str, *, plays: bool = True) -> Callable[[Callable[[Kind], None]], None]:
-    def enlist(test: Callable[[Kind], None]) -> None:
+def _promise(promise_id: str, reason: str, *, plays: bool = True) -> Callable[[Callable[[type[Any]], None]], None]:
+    def enlist(test: Callable[[type[Any]], None]) -> None:
         DRIVER_PROMISES.append(DriverPromise(promise_id, reason, test, plays))
 
     return enlist
@@ -54,7 +53,7 @@ def run_driver_checks(name: str) -> list[Verdict]:
     return [driver_verdict(promise, made) for promise in DRIVER_PROMISES]
 
 
-def driver_verdict(promise: DriverPromise, made: Kind) -> Verdict:
+def driver_verdict(promise: DriverPromise, made: type[Any]) -> Verdict:
     """What one promise comes to for one driver class; raises `DependencyError` for a package that is missing."""
     if promise.plays and not hasattr(made, "fake"):
         return Verdict(promise.id, promise.reason, Outcome.SKIPPED, "the driver ships no fake device: fake()")
@@ -69,13 +68,8 @@ def driver_verdict(promise: DriverPromise, made: Kind) -> Verdict:
     return Verdict(promise.id, promise.reason, Outcome.KEPT)
 
 
-def _require(condition: object, counter_example: str) -> None:
-    if not condition:
-        raise ConformanceError(counter_example)
-
-
 @contextmanager
-def _playing(made: Kind) -> Iterator[tuple[Driver, FakeDevice]]:
+def _playing(made: type[Any]) -> Iterator[tuple[Driver, FakeDevice]]:
     with made.fake() as device:
         driver = cast(Driver, made(NAME, device.clock, **device.settings))
         try:
@@ -103,22 +97,22 @@ def _measured(said: Sequence[DriverOutput]) -> list[Any]:
 
 
 @_promise("describes_itself", "a list of drivers must not need their hardware", plays=False)
-def _describes_itself(made: Kind) -> None:
-    _require(isinstance(getattr(made, "summary", None), str), "it has no one-line summary")
+def _describes_itself(made: type[Any]) -> None:
+    require(isinstance(getattr(made, "summary", None), str), "it has no one-line summary")
     for method in ("discover", "open", "poll", "close"):
-        _require(callable(getattr(made, method, None)), f"it has no method {method}")
+        require(callable(getattr(made, method, None)), f"it has no method {method}")
 
 
 @_promise("discovers_quietly", "looking for devices on any machine must end well", plays=False)
-def _discovers_quietly(made: Kind) -> None:
+def _discovers_quietly(made: type[Any]) -> None:
     found = made.discover()
-    _require(isinstance(found, list), f"discover answered {found!r}, not a list")
+    require(isinstance(found, list), f"discover answered {found!r}, not a list")
     strangers = [one for one in found if not isinstance(one, Found)]
-    _require(not strangers, f"discover found {strangers}, which are no Found")
+    require(not strangers, f"discover found {strangers}, which are no Found")
 
 
 @_promise("refuses_settings", "a misspelt setting must not be ignored", plays=False)
-def _refuses_settings(made: Kind) -> None:
+def _refuses_settings(made: type[Any]) -> None:
     try:
         made(NAME, BootClock(), no_such_setting=1)
     except (SettingError, TypeError):
@@ -127,37 +121,37 @@ def _refuses_settings(made: Kind) -> None:
 
 
 @_promise("has_a_spec", "the watchdog must know how long silence may last")
-def _has_a_spec(made: Kind) -> None:
+def _has_a_spec(made: type[Any]) -> None:
     with _playing(made) as (driver, _):
         spec = driver.spec
-        _require(isinstance(spec, DriverSpec), f"its spec is {spec!r}")
-        _require(spec.kinds, "its spec names no kinds of measurement")
-        _require(spec.nominal_hz >= spec.least_hz >= 0.0, f"nominal {spec.nominal_hz} Hz, least {spec.least_hz} Hz")
+        require(isinstance(spec, DriverSpec), f"its spec is {spec!r}")
+        require(spec.kinds, "its spec names no kinds of measurement")
+        require(spec.nominal_hz >= spec.least_hz >= 0.0, f"nominal {spec.nominal_hz} Hz, least {spec.least_hz} Hz")
 
 
 @_promise("opens_and_says_what", "a log must tell which device and which settings it came from")
-def _opens_and_says_what(made: Kind) -> None:
+def _opens_and_says_what(made: type[Any]) -> None:
     with _playing(made) as (driver, _):
         info = driver.open()
-        _require(isinstance(info, DeviceInfo), f"open answered {info!r}, not a DeviceInfo")
-        _require(info.model, "open tells no model")
+        require(isinstance(info, DeviceInfo), f"open answered {info!r}, not a DeviceInfo")
+        require(info.model, "open tells no model")
 
 
 @_promise("measures", "what the device says must come out, under the sensor's name and of the kinds of its spec")
-def _measures(made: Kind) -> None:
+def _measures(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
         device.speak()
         heard = _listen(driver, _is_measurement)
-        _require(_measured(heard), f"the device spoke and no measurement came in {TRIES} polls: {heard}")
+        require(_measured(heard), f"the device spoke and no measurement came in {TRIES} polls: {heard}")
         for said in heard:
             name = NAME if isinstance(said, Truth) else said.sensor
-            _require(name == NAME, f"{said} goes by the name {name!r}, not {NAME!r}")
-            _require(isinstance(said, (*driver.spec.kinds, Diagnostic)), f"{said} is of no kind that its spec names")
+            require(name == NAME, f"{said} goes by the name {name!r}, not {NAME!r}")
+            require(isinstance(said, (*driver.spec.kinds, Diagnostic)), f"{said} is of no kind that its spec names")
 
 
 @_promise("stamps_honestly", "a stamp is when it was true: never in the future, never before the device was opened")
-def _stamps_honestly(made: Kind) -> None:
+def _stamps_honestly(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         opened_ns = device.clock.now_ns()
         driver.open()
@@ -165,12 +159,12 @@ def _stamps_honestly(made: Kind) -> None:
         for said in _measured(_listen(driver, _is_measurement)):
             now_ns = device.clock.now_ns()
             early_s = seconds(opened_ns - said.time_ns)
-            _require(said.time_ns <= now_ns, f"{said} is stamped {seconds(said.time_ns - now_ns)} s in the future")
-            _require(early_s <= 0.0, f"{said} is stamped {early_s} s before the device was opened")
+            require(said.time_ns <= now_ns, f"{said} is stamped {seconds(said.time_ns - now_ns)} s in the future")
+            require(early_s <= 0.0, f"{said} is stamped {early_s} s before the device was opened")
 
 
 @_promise("numbers_rise", "a gap in the numbers is how a lost message shows")
-def _numbers_rise(made: Kind) -> None:
+def _numbers_rise(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
         heard = []
@@ -179,35 +173,35 @@ def _numbers_rise(made: Kind) -> None:
             heard += _measured(_listen(driver, _is_measurement))
         for kind in {type(said) for said in heard}:
             numbers = [getattr(said, "seq", said.time_ns) for said in heard if type(said) is kind]
-            _require(numbers == sorted(set(numbers)), f"{kind.__name__} came with the numbers {numbers}")
+            require(numbers == sorted(set(numbers)), f"{kind.__name__} came with the numbers {numbers}")
 
 
 @_promise("waits_no_longer", "a poll that blocks keeps the robot from stopping")
-def _waits_no_longer(made: Kind) -> None:
+def _waits_no_longer(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
         clocks = (device.clock, BootClock())
         before = [clock.now_ns() for clock in clocks]
         driver.poll(POLL_S)
         took_s = max(seconds(clock.now_ns() - at) for clock, at in zip(clocks, before, strict=True))
-        _require(took_s <= POLL_S + LATE_S, f"a poll of {POLL_S} s took {took_s:.2f} s")
+        require(took_s <= POLL_S + LATE_S, f"a poll of {POLL_S} s took {took_s:.2f} s")
 
 
 @_promise("survives_garbage", "one bad line costs that line, and is told")
-def _survives_garbage(made: Kind) -> None:
+def _survives_garbage(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
         device.garble()
         told = _listen(driver, lambda said: isinstance(said, Diagnostic) and said.level is not Level.OK)
-        _require(
+        require(
             any(isinstance(said, Diagnostic) for said in told), "the device said nonsense and no diagnostic tells of it"
         )
         device.speak()
-        _require(_measured(_listen(driver, _is_measurement)), "after nonsense no measurement came any more")
+        require(_measured(_listen(driver, _is_measurement)), "after nonsense no measurement came any more")
 
 
 @_promise("tells_of_loss", "a device that is gone must not look like one that is silent")
-def _tells_of_loss(made: Kind) -> None:
+def _tells_of_loss(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
         device.speak()
@@ -217,26 +211,26 @@ def _tells_of_loss(made: Kind) -> None:
             for _ in range(TRIES):
                 driver.poll(POLL_S)
         except DeviceLostError as error:
-            _require(error.hint, "the error gives no hint")
+            require(error.hint, "the error gives no hint")
             return
         raise ConformanceError(f"the device was unplugged and {TRIES} polls raised no DeviceLostError")
 
 
 @_promise("refuses_absence", "a missing device is an error with a remedy, and leaves nothing half open")
-def _refuses_absence(made: Kind) -> None:
+def _refuses_absence(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         device.unplug()
         try:
             driver.open()
         except DriverError as error:
-            _require(error.hint, "the error gives no hint")
-            _require(error.passes, f"{type(error).__name__} says that it cannot pass, but the device may be plugged in")
+            require(error.hint, "the error gives no hint")
+            require(error.passes, f"{type(error).__name__} says that it cannot pass, but the device may be plugged in")
             return
         raise ConformanceError("it opened a device that is not there")
 
 
 @_promise("comes_back", "a cable is pulled and put back: the same driver must go on")
-def _comes_back(made: Kind) -> None:
+def _comes_back(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
         device.unplug()
@@ -244,11 +238,11 @@ def _comes_back(made: Kind) -> None:
         device.plug()
         driver.open()
         device.speak()
-        _require(_measured(_listen(driver, _is_measurement)), "opened again after a loss, it measures nothing")
+        require(_measured(_listen(driver, _is_measurement)), "opened again after a loss, it measures nothing")
 
 
 @_promise("closes_always", "whatever state it is in, letting go must work")
-def _closes_always(made: Kind) -> None:
+def _closes_always(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.close()
         driver.open()

@@ -1,8 +1,8 @@
-"""A small known drive: what the conformance kit holds estimators against.
+"""A small run with known truth, against which the conformance kit holds estimators.
 
 Four anchors around a room, a robot on a circle (or a straight line), wheels, ranges, signal strengths and a gyro. The
-truth is a formula, so every test knows the right answer. The same drive can be turned, moved, renamed, made noisy or
-told at another odometry rate.
+truth is a formula, so every test knows the right answer. The same run can be turned, moved, renamed, made noisy or
+measured at another odometry rate.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ ANCHORS = ((0.0, 0.0), (10.0, 0.5), (9.5, 8.0), (0.5, 7.5))
 FLOOR = ((-2.0, -2.0), (12.0, 10.0))
 """Two opposite corners of the floor [m], before the room is turned and moved."""
 NOISE_STD = (0.1, 2.0)
-"""Noise of a range [m] and of a signal strength [dB], in a noisy drive."""
+"""Noise of a range [m] and of a signal strength [dB], in a noisy run."""
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
-    """How the robot drives, and how that is measured. ``map_from_room`` turns and moves everything together."""
+class SyntheticRun:
+    """Path of the robot, and the noise and rates of its sensors. ``map_from_room`` turns and moves everything together."""
 
     duration_s: float = 20.0
     speed_m_s: float = 0.5
@@ -52,7 +52,7 @@ class Drive:
     radio_until_s: float = math.inf
 
     def pose(self, time_ns: int) -> Pose:
-        """Where the robot really is."""
+        """True pose of the robot."""
         elapsed_s, rate = seconds(time_ns), self.turn_rate_rad_s
         turned = rate * elapsed_s
         path_m = self.speed_m_s * elapsed_s
@@ -103,11 +103,11 @@ class Drive:
             )
             found.append(Ranges(time_ns, "uwb", half, ranges))
             if half % 2 == 0:
-                heard = tuple(
+                strengths = tuple(
                     RssiReading(anchor.id, float(anchor.radio.expected(distance)) + NOISE_STD[1] * float(error))
                     for anchor, distance, error in zip(anchors, distances, errors[1], strict=True)
                 )
-                found.append(WifiScan(time_ns, "wifi", half, heard))
+                found.append(WifiScan(time_ns, "wifi", half, strengths))
         return found
 
 

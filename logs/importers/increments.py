@@ -8,23 +8,18 @@ of that time counts as not measured.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple, TypeVar
 
 from fusion import Odometry
 from fusion.errors import ParameterError, did_you_mean
 from fusion.odometry import MAX_WHEEL_SPEED_M_S, LinearDistance, wheel_increment
+from fusion.robot import WHEELS, Robot
 from fusion.values import seconds
-from fusion.world import Robot
 from logs.importers.bag import Topic
 from logs.importers.samples import JointSample, PoseSample, Sample
 
-SIDES: Mapping[str, tuple[tuple[str, ...], ...]] = {
-    "differential": (("left",), ("right",)),
-    "skid_steer": (("front", "left"), ("front", "right"), ("rear", "left"), ("rear", "right")),
-}
-"""Words by which the joint of each wheel is known, in the wheel order of `World`."""
 SHORTEST_SPAN_S = 0.1
 """Stamps that lie closer than this are too rough for a speed."""
 SIDEWAYS_SHARE = 0.05
@@ -103,18 +98,18 @@ def wheel_joints(topic: Topic, named: Sequence[str], robot: Robot) -> tuple[str,
 
     Raises `ParameterError` where they cannot be known.
     """
-    sides = SIDES.get(robot.drive)
-    if sides is None:
+    wheels = [name.split("_") for name in WHEELS[robot.drive]]
+    if not wheels:
         raise ParameterError(f"wheels: the world's robot has none (robot.drive is {robot.drive!r}); correct it")
-    by_words = [[name for name in topic.names if all(word in name.lower() for word in side)] for side in sides]
+    by_words = [[name for name in topic.names if all(word in name.lower() for word in words)] for words in wheels]
     joints = tuple(named) or tuple(names[0] for names in by_words if len(names) == 1)
     for joint in joints:
         if joint not in topic.names:
             raise ParameterError(f"wheels: {topic.name} has no joint {joint!r}; {did_you_mean(joint, topic.names)}")
-    if len(joints) != len(sides):
+    if len(joints) != len(wheels):
         raise ParameterError(
             f"wheels: which joints of {topic.name} ({', '.join(sorted(topic.names)) or 'it names none'}) are the "
-            f"wheels ({', '.join(' '.join(side) for side in sides)})? Name them: wheels={topic.name}:JOINT,..."
+            f"wheels ({', '.join(map(' '.join, wheels))})? Name them: wheels={topic.name}:JOINT,..."
         )
     return joints
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from fusion import World
 from fusion.errors import ParameterError, did_you_mean
-from fusion.world import DRIVES
+from fusion.robot import WHEELS
 from logs.importers import foxglove
 from logs.importers.bag import TRANSFORM_TYPES, Bag, Topic
 from logs.importers.increments import wheel_joints
@@ -156,7 +156,7 @@ def _find(cast: Cast, bag: Bag, world: World, topics: Mapping[str, str], free: S
     """Fill the roles that nobody was named for, but for the truth. The motion is told once: by the odometry first."""
     for role in ("odom", "wheels", "gyro", "wifi"):
         moves = role in ("odom", "wheels") and ("odom" in cast.topics or "wheels" in cast.topics)
-        has_wheels = DRIVES[world.robot.drive] > 0
+        has_wheels = bool(WHEELS[world.robot.drive])
         if role in topics or moves or (role == "wheels" and not has_wheels):
             continue
         candidates = [topic for topic in free if topic.type in ROLES[role]]

@@ -16,7 +16,7 @@ import numpy as np
 
 from fusion import Pose
 from fusion.arrays import Floats
-from fusion.world import Robot
+from fusion.robot import Robot
 
 
 class Roll(NamedTuple):

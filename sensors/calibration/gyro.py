@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fusion import LogError, ParameterError
+from fusion.robot import Robot
 from fusion.values import NANOSECONDS
-from fusion.world import Robot
 from logs.run import Run
 from sensors.calibration.allan import Allan, allan
 from sensors.calibration.held_out import BeforeAfter, Interval, root_mean_square

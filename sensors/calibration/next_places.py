@@ -15,8 +15,9 @@ import numpy as np
 
 from fusion import World
 from fusion.arrays import Floats
+from fusion.radio import RadioKind
 from sensors.calibration.line import Line
-from sensors.calibration.readings_by_place import Kind, Readings, model_of
+from sensors.calibration.readings_by_place import Readings
 
 CANDIDATES = 60
 
@@ -36,10 +37,10 @@ def pooled_covariance(line: Line) -> Floats:
     return np.asarray(pick @ line.covariance @ pick.T)
 
 
-def next_places(world: World, kind: Kind, readings: Readings, line: Line, count: int = 3) -> list[Advice]:
+def next_places(world: World, kind: RadioKind, readings: Readings, line: Line, count: int = 3) -> list[Advice]:
     """The best ``count`` places to add, one after another, each a place of its own."""
     candidates = _reachable(world)
-    gain_at: Callable[[Floats], Floats] = model_of(world.anchors[0], kind).by_gain
+    gain_at: Callable[[Floats], Floats] = world.anchors[0].model(kind).by_gain
     rows = np.column_stack([np.ones(CANDIDATES), gain_at(candidates)])
     asked = np.column_stack([np.ones(len(readings.gain)), readings.gain])
     weight, covariance, found = asked.T @ asked / len(asked), pooled_covariance(line), list[Advice]()

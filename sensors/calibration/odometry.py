@@ -19,7 +19,7 @@ import numpy as np
 
 from fusion import LogError, ParameterError
 from fusion.arrays import Flags, Floats, Whole
-from fusion.world import Robot
+from fusion.robot import Robot
 from logs.run import Run
 from sensors.calibration.arcs import Roll, arc_end, turn_rad
 from sensors.calibration.held_out import BeforeAfter, Interval, root_mean_square

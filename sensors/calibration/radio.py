@@ -14,12 +14,12 @@ import numpy as np
 from fusion import LogError, World
 from fusion.arrays import Flags, Floats, Whole
 from fusion.quantiles import quantile
-from fusion.radio import DistanceModel, PathLoss, Ranging
+from fusion.radio import DistanceModel, PathLoss, RadioKind, Ranging
 from logs.run import Run
 from sensors.calibration.held_out import BeforeAfter, Interval, root_mean_square
 from sensors.calibration.line import LEAST_PLACES, Estimate, Line, fit_line
 from sensors.calibration.next_places import Advice, next_places
-from sensors.calibration.readings_by_place import KINDS, UNITS, Kind, Readings, gather, model_of
+from sensors.calibration.readings_by_place import KINDS, UNITS, Readings, gather
 from sensors.calibration.spots import Spots, spots
 
 FOLDS = 5
@@ -42,7 +42,7 @@ class AnchorFit(NamedTuple):
 class RadioCalibration(NamedTuple):
     """Everything that was found of one kind of readings. ``std``: of one reading about the line, robust."""
 
-    kind: Kind
+    kind: RadioKind
     readings: Readings
     line: Line
     spots: Spots
@@ -52,7 +52,7 @@ class RadioCalibration(NamedTuple):
     advice: Sequence[Advice]
 
 
-def kinds_in(runs: Sequence[Run]) -> list[Kind]:
+def kinds_in(runs: Sequence[Run]) -> list[RadioKind]:
     """The kinds of readings there are; raises `LogError` without any."""
     found = [kind for kind, values in KINDS.items() if any(isinstance(m, values) for r in runs for m in r.measurements)]
     if not found:
@@ -61,7 +61,7 @@ def kinds_in(runs: Sequence[Run]) -> list[Kind]:
 
 
 def calibrate_radio(
-    runs: Sequence[Run], kind: Kind, points: Path | None = None, place_m: float | None = None
+    runs: Sequence[Run], kind: RadioKind, points: Path | None = None, place_m: float | None = None
 ) -> RadioCalibration:
     """Raises `LogError` without truth, without readings, with too few places or with all at one distance."""
     world = runs[0].world
@@ -80,7 +80,7 @@ def calibrate_radio(
     )
 
 
-def _nominal_gain(world: World, kind: Kind) -> float:
+def _nominal_gain(world: World, kind: RadioKind) -> float:
     radio, ranging = world.anchors[0].radio, world.anchors[0].ranging
     return radio.path_loss_exponent if kind == "rssi" else ranging.scale
 
@@ -102,7 +102,7 @@ def calibrated(model: DistanceModel, gain: float, level: float) -> DistanceModel
     return dataclasses.replace(model, scale=gain, offset_m=level)
 
 
-def _scores(world: World, kind: Kind, readings: Readings) -> list[BeforeAfter]:
+def _scores(world: World, kind: RadioKind, readings: Readings) -> list[BeforeAfter]:
     """Blocks of neighbouring places take turns to be left out, then every single place."""
     count = int(readings.place.max()) + 1
     before = _errors(world, kind, readings, None)
@@ -122,7 +122,7 @@ def _scores(world: World, kind: Kind, readings: Readings) -> list[BeforeAfter]:
     return scores
 
 
-def _left_out(world: World, kind: Kind, readings: Readings, fold: Whole) -> tuple[Floats, Floats] | None:
+def _left_out(world: World, kind: RadioKind, readings: Readings, fold: Whole) -> tuple[Floats, Floats] | None:
     """Errors of every reading by a line that was fitted without its fold; None where what is left is too poor."""
     found = np.empty((2, len(fold)))
     for each in np.unique(fold):
@@ -136,13 +136,13 @@ def _left_out(world: World, kind: Kind, readings: Readings, fold: Whole) -> tupl
     return found[0], found[1]
 
 
-def _errors(world: World, kind: Kind, readings: Readings, line: Estimate | None) -> tuple[Floats, Floats]:
+def _errors(world: World, kind: RadioKind, readings: Readings, line: Estimate | None) -> tuple[Floats, Floats]:
     """Reading minus expected, and distance told by the reading minus the true one [m], infinite where the line does not
     fall with distance; ``line`` None: by the world.
     """
     found = np.empty((2, len(readings.value)))
     for i, anchor in enumerate(world.anchors):
-        rows, model = readings.anchor == i, model_of(anchor, kind)
+        rows, model = readings.anchor == i, anchor.model(kind)
         if line is not None:
             level = line.level if math.isnan(line.levels[i]) else float(line.levels[i])
             model = calibrated(model, line.gain, level)

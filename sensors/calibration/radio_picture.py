@@ -11,7 +11,7 @@ from fusion import World
 from fusion.output.colours import anchor_colour
 from fusion.output.figures import label, panels, plain, plain_ticks
 from sensors.calibration.radio import RadioCalibration, calibrated
-from sensors.calibration.readings_by_place import UNITS, model_of
+from sensors.calibration.readings_by_place import UNITS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +44,7 @@ def _draw_line(axes: Axes, world: World, found: RadioCalibration) -> None:
             axes.plot(
                 told[rows], found.spots.value[rows] - off * told[rows], ".", color=colour, markersize=4, label=anchor.id
             )
-            model = calibrated(model_of(anchor, found.kind), found.line.gain, float(found.line.levels[i]))
+            model = calibrated(anchor.model(found.kind), found.line.gain, float(found.line.levels[i]))
             axes.plot(reach, model.expected(reach) - off * reach, color=colour, linewidth=1.0)
     axes.legend(fontsize=7, ncols=2)
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from fusion import LogError, Pose, Ranges, RssiReading, WifiScan, World
 from fusion.arrays import Flags, Floats, Whole
-from fusion.radio import DistanceModel
+from fusion.radio import RadioKind
 from fusion.world import Anchor
 from logs.importers.foreign_recording import read_table
 from logs.prior import begin_ns
@@ -23,9 +23,8 @@ from logs.run import Run
 from logs.truth import Instants, interpolate_truth, known_truth
 from sensors.calibration.segments import GAP_S
 
-Kind = Literal["rssi", "range"]
-KINDS: dict[Kind, type[WifiScan] | type[Ranges]] = {"rssi": WifiScan, "range": Ranges}
-UNITS: dict[Kind, str] = {"rssi": "dB", "range": "m"}
+KINDS: dict[RadioKind, type[WifiScan] | type[Ranges]] = {"rssi": WifiScan, "range": Ranges}
+UNITS: dict[RadioKind, str] = {"rssi": "dB", "range": "m"}
 PLACE_M, PLACES_ACROSS = 1.0, 16
 """Radius of a place, or this part of a smaller floor; doubled until there are at most `MOST_PLACES`."""
 MOST_PLACES = 200
@@ -65,12 +64,7 @@ class Readings(NamedTuple):
         )
 
 
-def model_of(anchor: Anchor, kind: Kind) -> DistanceModel:
-    """What the world says of an anchor's readings of a kind."""
-    return anchor.radio if kind == "rssi" else anchor.ranging
-
-
-def gather(runs: Sequence[Run], kind: Kind, points: Path | None = None, place_m: float | None = None) -> Readings:
+def gather(runs: Sequence[Run], kind: RadioKind, points: Path | None = None, place_m: float | None = None) -> Readings:
     """All readings of a kind that were taken where the truth, or a survey in ``points``, knows the robot to be.
 
     Raises `LogError` where there are none.
@@ -141,7 +135,7 @@ def _surveyed(path: Path, run: Run) -> _Where:
 
 
 def _rows(
-    world: World, kind: Kind, told: Sequence[WifiScan | Ranges], where: _Where
+    world: World, kind: RadioKind, told: Sequence[WifiScan | Ranges], where: _Where
 ) -> Iterator[tuple[int, float, float, float, float, float]]:
     """Anchor, value, distance, gain, x and y of every finite reading of a known anchor at a known place."""
     index = {anchor.id: i for i, anchor in enumerate(world.anchors)}
@@ -156,7 +150,7 @@ def _rows(
             anchor = world.anchors[index[reading.anchor]]
             x, y = float(poses.x[i]), float(poses.y[i])
             away = distance_m(Pose(x, y, float(poses.heading[i])), anchor, world.robot.antenna_m)
-            yield index[anchor.id], value, away, float(model_of(anchor, kind).by_gain(away)), x, y
+            yield index[anchor.id], value, away, float(anchor.model(kind).by_gain(away)), x, y
 
 
 def distance_m(base: Pose, anchor: Anchor, antenna_m: tuple[float, float, float]) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from fusion.arrays import Floats
 from fusion.odometry import LinearDistance
-from fusion.world import OdometryNoise, Robot
+from fusion.robot import OdometryNoise, Robot
 from sensors.calibration.held_out import Interval
 from sensors.calibration.segments import STRAIGHT, Segment
 from sensors.calibration.wheels import Wheels

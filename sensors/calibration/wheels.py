@@ -10,8 +10,8 @@ import numpy as np
 from fusion import LogError, MotorCommand, Odometry, WheelTicks
 from fusion.arrays import Floats, Whole
 from fusion.odometry import Odometer
+from fusion.robot import WHEELS, Robot
 from fusion.timeline import order
-from fusion.world import DRIVES, Robot
 from logs.run import Run
 
 
@@ -61,7 +61,7 @@ def wheels(run: Run) -> Wheels:
     """
     robot = nominal(run.world.robot)
     kinds = {type(measurement) for measurement in run.measurements}
-    ready_made = WheelTicks not in kinds or DRIVES[robot.drive] == 0
+    ready_made = WheelTicks not in kinds or not WHEELS[robot.drive]
     told = (Odometry,) if ready_made else (WheelTicks, MotorCommand)
     chosen = sorted((m for m in run.measurements if isinstance(m, told)), key=order)
     steps = _steps(robot, chosen)

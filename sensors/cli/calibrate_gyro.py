@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from fusion.output.tables import Sheet
-from fusion.world import Robot
+from fusion.robot import Robot
 from logs.run import Run
 from sensors.calibration.gyro import GyroCalibration, calibrate_gyro
 from sensors.calibration.gyro_picture import draw

@@ -10,17 +10,18 @@ from pathlib import Path
 
 from fusion import ParameterError, World
 from fusion.output.tables import Sheet
+from fusion.radio import RadioKind
 from logs.run import Run
 from sensors.calibration.held_out import Interval, sheet
 from sensors.calibration.radio import RadioCalibration, calibrate_radio, changes, kinds_in
 from sensors.calibration.radio_picture import draw
-from sensors.calibration.readings_by_place import UNITS, Kind
+from sensors.calibration.readings_by_place import UNITS
 from sensors.cli.calibration import Findings, calibrate, configure_common
 
 METHOD = "Huber's M-estimator over places, covariance by correlation over the floor (Gudmundson 1991, REML)"
-GAINS: dict[Kind, str] = {"rssi": "path-loss exponent n", "range": "scale"}
-LEVELS: dict[Kind, str] = {"rssi": "RSSI at the reference distance, dBm", "range": "offset, m"}
-WIDE: dict[Kind, float] = {"rssi": 1.0, "range": 0.2}
+GAINS: dict[RadioKind, str] = {"rssi": "path-loss exponent n", "range": "scale"}
+LEVELS: dict[RadioKind, str] = {"rssi": "RSSI at the reference distance, dBm", "range": "offset, m"}
+WIDE: dict[RadioKind, float] = {"rssi": 1.0, "range": 0.2}
 """An interval of the gain that reaches further says nothing of use."""
 SELDOM = 0.95
 """Heard in a smaller share of the scans, the weak readings that are missing bend the line."""

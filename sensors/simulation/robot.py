@@ -29,8 +29,8 @@ from fusion import (
     WifiScan,
     wrap_angle,
 )
+from fusion.robot import WHEELS
 from fusion.values import nanoseconds
-from fusion.world import DRIVES
 from sensors.simulation.channel import Channel
 from sensors.simulation.route import Moment, drive
 from sensors.simulation.scenario import STEP_S, Scenario
@@ -99,7 +99,7 @@ class SimulatedRobot:
         """Steps from one message of a sensor to its next, for all that are on."""
         reality = self.scenario.reality
         rates = {
-            "ticks": reality.ticks_hz if DRIVES[self.scenario.world.robot.drive] else 0.0,
+            "ticks": reality.ticks_hz if WHEELS[self.scenario.world.robot.drive] else 0.0,
             "gyro": reality.gyro_hz,
             "wifi": reality.wifi_hz,
             "ranges": reality.range_hz if self._channels else 0.0,
@@ -124,7 +124,8 @@ class SimulatedRobot:
         robot = self.scenario.world.robot
         sideways = 0.5 * robot.track_width_m * moment.turn_rate
         sides = (moment.speed - sideways, moment.speed + sideways)
-        return MotorCommand(moment.time_ns - nanoseconds(STEP_S), "motors", step, sides * (DRIVES[robot.drive] // 2))
+        axles = len(WHEELS[robot.drive]) // 2
+        return MotorCommand(moment.time_ns - nanoseconds(STEP_S), "motors", step, sides * axles)
 
     def _roll(self, moments: tuple[Moment, ...]) -> Steps:
         """What the left and right encoders have counted by the end of each step [m], (n, 2).
@@ -160,7 +161,7 @@ class SimulatedRobot:
         robot, time_ns, pose = self.scenario.world.robot, moment.time_ns, moment.pose
         if "ticks" in due:
             left, right = (math.floor(side / robot.distance_per_tick_m) for side in rolled)
-            yield WheelTicks(time_ns, "encoders", step, (left, right) * (DRIVES[robot.drive] // 2))
+            yield WheelTicks(time_ns, "encoders", step, (left, right) * (len(WHEELS[robot.drive]) // 2))
         if "gyro" in due:
             noise = self._streams["gyro"].normal(0.0, self.scenario.reality.gyro_noise_std_rad_s)
             yield Gyro(time_ns, "gyro", step, float(turn_rate / robot.gyro_scale + self._gyro_bias + noise))

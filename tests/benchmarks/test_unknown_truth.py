@@ -7,13 +7,13 @@ import pytest
 
 from fusion import Truth
 from fusion.cli.main import main
-from fusion.conformance.synthetic_run import Drive
+from fusion.conformance.synthetic_run import SyntheticRun
 from fusion.values import NANOSECONDS
 from logs.cli.export import export_csv
 from logs.reader import read_run
 from logs.writer import RunWriter
 
-DRIVE = Drive(duration_s=10.0)
+DRIVE = SyntheticRun(duration_s=10.0)
 COUNT = 21
 """True poses, two a second."""
 ESTIMATORS = ("dead_reckoning", "ekf", "filterpy_ukf", "particle")

@@ -22,15 +22,14 @@ from fusion import (
     Reason,
     Tag,
     compose,
+    radio_readings,
     registered,
-    sightings,
     wrap_angle,
 )
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.cli import check as verb
 from fusion.cli.main import main
-from fusion.conformance.checks import Check, Outcome, _verdict, checks, run_checks
-from fusion.conformance.estimator_promises import PROMISES
+from fusion.conformance.checks import PROMISES, Check, Outcome, _verdict, checks, run_checks
 
 
 class State(NamedTuple):
@@ -64,11 +63,11 @@ class Correct:
     def see(self, state, scan):
         mean, p = np.array(state.pose), np.array(state.covariance.matrix)
         before, p_before, fates = mean, p, []
-        for sighting in sightings(self.world, scan):
-            expected = sighting.expect(*before, self.world.robot.antenna_m)
+        for reading in radio_readings(self.world, scan):
+            expected = reading.expect(*before, self.world.robot.antenna_m)
             row = np.array([expected.by_x, expected.by_y, expected.by_heading])
-            variance = sighting.variance + sighting.model.bias_std**2
-            innovation, spread = sighting.value - expected.value, float(row @ p_before @ row) + variance
+            variance = reading.variance + reading.model.bias_std**2
+            innovation, spread = reading.value - expected.value, float(row @ p_before @ row) + variance
             nis = innovation**2 / spread
             used = nis <= self.gate
             if used:
@@ -76,7 +75,7 @@ class Correct:
                 mean = mean + gain * (innovation - row @ (mean - before))
                 p = p - np.outer(gain, row @ p)
             verdict = (Decision.USED, Reason.OK, 1.0) if used else (Decision.REJECTED, Reason.GATE, 0.0)
-            who = (scan.time_ns, scan.sensor, scan.seq, sighting.anchor.id)
+            who = (scan.time_ns, scan.sensor, scan.seq, reading.anchor.id)
             fates.append(Fate(*who, *verdict, innovation, spread, nis))
         x, y, heading = mean.tolist()
         spread = Covariance(p[0, 0], p[0, 1], p[0, 2], p[1, 1], p[1, 2], p[2, 2])
@@ -366,7 +365,7 @@ BROKEN = {
     OrderOfNames: "names-mean-nothing",
     NoGate: "outlier-is-bounded",
     Backwards: "forward-is-forward",
-    ConstantCovariance: "silence-is-told",
+    ConstantCovariance: "radio-silence",
     GuessesByTheBits: "rate-means-nothing",
     NoisePerStep: "closing-changes-little",
     ForgetsClosedStretches: "closing-changes-little",

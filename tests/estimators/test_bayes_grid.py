@@ -141,7 +141,7 @@ def test_what_leaves_the_floor_stays_at_its_edge():
     assert np.allclose(kernel.sum(axis=1), 1.0)
 
 
-@pytest.mark.parametrize("options", [{"cells": 1}, {"headings": 1}, {"outlier_share": 0.0}, {"most_alike": 0.9}])
+@pytest.mark.parametrize("options", [{"cells": 1}, {"headings": 1}, {"outlier_share": 0.0}, {"max_correlated": 0.9}])
 def test_impossible_options_are_refused(options):
     with pytest.raises(ParameterError, match="bayes_grid"):
         BayesGrid(world(), **options)

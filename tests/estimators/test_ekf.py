@@ -185,9 +185,9 @@ def test_gate_is_the_chi_square_quantile(probability):
         {"gate_probability": 0.0},
         {"gate_probability": 1.5},
         {"range_bias_length_m": 0.0},
-        {"most_alike": 0.9},
-        {"most_alike": math.nan},
-        {"most_alike": math.inf},
+        {"max_correlated": 0.9},
+        {"max_correlated": math.nan},
+        {"max_correlated": math.inf},
     ],
 )
 def test_impossible_options_are_refused(options):

@@ -127,7 +127,7 @@ def test_resampling_keeps_mean_and_covariance():
 
 
 @pytest.mark.parametrize(
-    "options", [{"particles": 0}, {"outlier_share": 0.0}, {"outlier_share": 1.0}, {"most_alike": 0.9}]
+    "options", [{"particles": 0}, {"outlier_share": 0.0}, {"outlier_share": 1.0}, {"max_correlated": 0.9}]
 )
 def test_impossible_options_are_refused(options):
     with pytest.raises(ParameterError, match="particle"):

@@ -24,7 +24,7 @@ from fusion import (
     World,
     WorldError,
     build,
-    sightings,
+    radio_readings,
     track,
 )
 from fusion.correlated_error import repeated_variance, total_variance
@@ -64,33 +64,33 @@ def spread(name, step_m, scans=40, radio=None, **options):
 
 @pytest.mark.parametrize(("path_m", "times"), [(0.0, 3.0), (0.5, 3.0), (1.0, 2.0), (2.0, 1.0), (9.0, 1.0)])
 def test_common_error_of_neighbouring_signal_strengths_counts_as_often_as_they_share_it(path_m, times):
-    sighting = sightings(world(), scan(0, 0))[0]
-    assert repeated_variance(sighting, path_m, 3.0) == pytest.approx(2.0**2 + times * 3.0**2)
-    assert repeated_variance(sighting, path_m, 1.0) == total_variance(sighting)
+    reading = radio_readings(world(), scan(0, 0))[0]
+    assert repeated_variance(reading, path_m, 3.0) == pytest.approx(2.0**2 + times * 3.0**2)
+    assert repeated_variance(reading, path_m, 1.0) == total_variance(reading)
 
 
 def test_error_of_a_range_belongs_to_the_radio_and_is_not_counted_by_the_path():
-    sighting = sightings(world(), Ranges(0, "uwb", 0, (RangeReading("a", 20.0),)))[0]
-    assert repeated_variance(sighting, 0.0, 3.0) == total_variance(sighting)
+    reading = radio_readings(world(), Ranges(0, "uwb", 0, (RangeReading("a", 20.0),)))[0]
+    assert repeated_variance(reading, 0.0, 3.0) == total_variance(reading)
 
 
 @FILTERS
 def test_robot_at_rest_grows_less_certain_of_what_it_hears_again_and_again(name):
     """Three times the common error at most: the information is that of 2^2 + 3 * 3^2 dB^2 in place of 2^2 + 3^2."""
-    assert spread(name, 0.0) > 1.5 * spread(name, 0.0, most_alike=1.0)
-    assert spread(name, 0.0, most_alike=10.0) > 1.5 * spread(name, 0.0)
+    assert spread(name, 0.0) > 1.5 * spread(name, 0.0, max_correlated=1.0)
+    assert spread(name, 0.0, max_correlated=10.0) > 1.5 * spread(name, 0.0)
 
 
 @FILTERS
 def test_readings_further_apart_than_shadowing_reaches_count_in_full(name):
-    assert spread(name, 2.5) == pytest.approx(spread(name, 2.5, most_alike=1.0), rel=1e-12)
+    assert spread(name, 2.5) == pytest.approx(spread(name, 2.5, max_correlated=1.0), rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["ekf", "filterpy_ekf"])
 def test_information_at_rest_is_that_of_the_inflated_noise(name):
     """The extended filters add H^T H / R a reading, to first order around the truth, where they stand."""
     place, scans = world(), 8
-    slopes = [s.expect(0.0, 0.0, 0.0, place.robot.antenna_m) for s in sightings(place, scan(0, 0))]
+    slopes = [s.expect(0.0, 0.0, 0.0, place.robot.antenna_m) for s in radio_readings(place, scan(0, 0))]
     rows = np.array([(slope.by_x, slope.by_y) for slope in slopes])
     told = [scan(k * SECOND, k) for k in range(1, scans + 1)]
     start = Prior(0, START.pose, Covariance.from_std(1.0, 1.0, 1e-9))
@@ -106,33 +106,33 @@ def test_innovation_keeps_the_variance_of_one_reading(name):
     """What is repeated makes a reading worth less, not its innovation wider: the gate and NIS stay as they were."""
     place = world()
     fates = [
-        next(iter(track(build(name, place, {"most_alike": most}), place, [scan(SECOND, 1)], START))).fates
+        next(iter(track(build(name, place, {"max_correlated": most}), place, [scan(SECOND, 1)], START))).fates
         for most in (1.0, 9.0)
     ]
     assert [fate.nis for fate in fates[0]] == [fate.nis for fate in fates[1]]
 
 
 @FILTERS
-@pytest.mark.parametrize("most_alike", [0.99, math.nan, math.inf])
-def test_impossible_sharing_is_refused(name, most_alike):
-    with pytest.raises(ParameterError, match="most_alike is"):
-        build(name, world(), {"most_alike": most_alike})
+@pytest.mark.parametrize("max_correlated", [0.99, math.nan, math.inf])
+def test_impossible_sharing_is_refused(name, max_correlated):
+    with pytest.raises(ParameterError, match="max_correlated is"):
+        build(name, world(), {"max_correlated": max_correlated})
 
 
 TOLD = {"shadowing_length_m": 5.0}
 
 
 @pytest.mark.parametrize(
-    ("path_m", "most_alike", "times"), [(0.0, None, 20.0), (0.5, None, 10.0), (9.0, None, 1.0), (0.5, 4.0, 4.0)]
+    ("path_m", "max_correlated", "times"), [(0.0, None, 20.0), (0.5, None, 10.0), (9.0, None, 1.0), (0.5, 4.0, 4.0)]
 )
-def test_common_error_counts_as_often_as_the_world_tells_that_it_is_shared(path_m, most_alike, times):
-    sighting = sightings(world(**TOLD), scan(0, 0))[0]
-    assert repeated_variance(sighting, path_m, most_alike) == pytest.approx(2.0**2 + times * 3.0**2)
+def test_common_error_counts_as_often_as_the_world_tells_that_it_is_shared(path_m, max_correlated, times):
+    reading = radio_readings(world(**TOLD), scan(0, 0))[0]
+    assert repeated_variance(reading, path_m, max_correlated) == pytest.approx(2.0**2 + times * 3.0**2)
 
 
 def test_common_error_counts_up_to_three_times_where_the_world_does_not_tell():
-    sighting = sightings(world(), scan(0, 0))[0]
-    assert repeated_variance(sighting, 0.0, None) == repeated_variance(sighting, 0.0, 3.0)
+    reading = radio_readings(world(), scan(0, 0))[0]
+    assert repeated_variance(reading, 0.0, None) == repeated_variance(reading, 0.0, 3.0)
 
 
 @FILTERS

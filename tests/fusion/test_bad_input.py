@@ -27,7 +27,7 @@ from fusion import (
     names,
     track,
 )
-from fusion.conformance.synthetic_run import Drive
+from fusion.conformance.synthetic_run import SyntheticRun
 
 ANCHORS = [{"id": "a", "position_m": [0, 0]}, {"id": "b", "position_m": [5, 0]}, {"id": "c", "position_m": [0, 5]}]
 BOUNDS = "[bounds]\nx_min = 0\nx_max = 1\ny_min = 0\ny_max = 1\n"
@@ -35,7 +35,7 @@ BOUNDS = "[bounds]\nx_min = 0\nx_max = 1\ny_min = 0\ny_max = 1\n"
 
 def fold(*measurements, robot=None):
     world = World.from_table({"anchors": ANCHORS, "robot": robot or {}})
-    return list(track(build("dead_reckoning", world), world, measurements, Drive().prior()))
+    return list(track(build("dead_reckoning", world), world, measurements, SyntheticRun().prior()))
 
 
 @pytest.mark.parametrize(
@@ -71,14 +71,14 @@ def test_odometry_that_ends_before_it_begins_is_refused_and_moves_nothing():
     backwards = Odometry(10**9, "wheels", 1, 2 * 10**9, 1.0, 0.0)
     updates = fold(backwards, Ranges(11 * 10**8, "uwb", 1, (RangeReading("a", 1.0),)))
     assert [fate.reason for fate in updates[0].fates] == [Reason.BAD_CLOCK]
-    assert updates[-1].estimate.pose == Drive().pose(0)
+    assert updates[-1].estimate.pose == SyntheticRun().pose(0)
 
 
 def test_encoder_that_starts_over_loses_one_message_and_no_more():
     robot = {"drive": "differential", "ticks_per_revolution": 100, "wheel_circumference_m": 1.0}
     counts = [1000, 1010, 0, 10, 20]
     ticks = [WheelTicks((i + 1) * 10**8, "wheels", i, (count, count)) for i, count in enumerate(counts)]
-    driven = fold(*ticks, robot=robot)[-1].estimate.pose.x - Drive().pose(0).x
+    driven = fold(*ticks, robot=robot)[-1].estimate.pose.x - SyntheticRun().pose(0).x
     assert driven == pytest.approx(0.3)
 
 
@@ -118,13 +118,14 @@ def test_prior_may_leave_open_what_is_not_known_whatever_its_numbers():
 
 @pytest.mark.parametrize("name", [name for name in names() if Tag.HEADING_START in load(name).tags])
 def test_estimator_that_starts_without_a_heading_reads_none_of_its_numbers(name):
-    place, start = Drive().world(), replace(Drive().prior(), heading_known=False)
+    place, start = SyntheticRun().world(), replace(SyntheticRun().prior(), heading_known=False)
     hollow = replace(
         start,
         pose=start.pose._replace(heading=math.nan),
         covariance=start.covariance._replace(xh=math.nan, yh=math.nan, hh=math.nan),
     )
     with_any, with_none = (
-        digest(track(build(name, place), place, Drive().measurements(), prior, seed=1)) for prior in (start, hollow)
+        digest(track(build(name, place), place, SyntheticRun().measurements(), prior, seed=1))
+        for prior in (start, hollow)
     )
     assert with_any == with_none

@@ -39,17 +39,17 @@ from fusion import (
     digest,
     final,
     generator,
-    sightings,
+    radio_readings,
     track,
     wrap_angle,
 )
 from fusion.cli.main import main
-from fusion.conformance.synthetic_run import Drive
+from fusion.conformance.synthetic_run import SyntheticRun
 from fusion.odometry import Odometer, wheel_increment
 from fusion.radio import PathLoss, Ranging, free_space_loss_db
+from fusion.robot import Robot
 from fusion.trilateration import closed_form, least_squares, trilaterate
 from fusion.values import nanoseconds
-from fusion.world import Robot
 
 SECOND = 1_000_000_000
 ANCHORS = [
@@ -145,17 +145,17 @@ def test_derivatives_of_a_sighting_are_those_of_finite_differences(model, x, y, 
         if model == "radio"
         else Ranges(0, "r", 0, (RangeReading("a", 3.0),))
     )
-    (sighting,) = sightings(place, scan)
+    (reading,) = radio_readings(place, scan)
     antenna = place.robot.antenna_m
-    here, step = sighting.expect(x, y, heading, antenna), 1e-6
+    here, step = reading.expect(x, y, heading, antenna), 1e-6
     if math.hypot(x, y) < 2.0:
         return
     for index, analytic in enumerate((here.by_x, here.by_y, here.by_heading)):
         moved = [x, y, heading]
         moved[index] += step
-        ahead = sighting.expect(*moved, antenna).value
+        ahead = reading.expect(*moved, antenna).value
         moved[index] -= 2 * step
-        numeric = (ahead - sighting.expect(*moved, antenna).value) / (2 * step)
+        numeric = (ahead - reading.expect(*moved, antenna).value) / (2 * step)
         assert analytic == pytest.approx(numeric, abs=1e-5)
 
 
@@ -291,7 +291,7 @@ def test_message_stamped_right_behind_the_one_before_makes_no_leap(behind_ns, he
     assert 0.0 < held.turn_rad < 3.0 * 0.2
 
 
-DRIVE = Drive(noisy=True, duration_s=8.0)
+DRIVE = SyntheticRun(noisy=True, duration_s=8.0)
 
 
 def cut(measurements, at_ns):

@@ -7,7 +7,7 @@ import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg, get_typestore
 
-from logs.messages import SCHEMAS
+from logs.schemas import SCHEMAS
 
 SECOND = 1_000_000_000
 OWN = ("fusion_msgs/msg/WifiScan", "fusion_msgs/msg/Ranges")

@@ -22,7 +22,8 @@ from fusion import (
     WifiScan,
 )
 from logs.cdr import Packer, Unpacker
-from logs.messages import KINDS, SCHEMAS, encode_estimate
+from logs.messages import CODECS, encode_estimate
+from logs.schemas import SCHEMAS
 
 T = 1_652_380_260_171_842_098
 VALUES = (
@@ -49,12 +50,12 @@ def ros():
 
 @pytest.mark.parametrize("value", VALUES, ids=lambda value: type(value).__name__)
 def test_bytes_are_those_another_library_writes_for_the_same_message(ros, value):
-    kind = KINDS[type(value)]
-    data = kind.encode(value)
-    message = ros.deserialize_cdr(data, kind.schema)
+    codec = CODECS[type(value)]
+    data = codec.encode(value)
+    message = ros.deserialize_cdr(data, codec.schema)
     assert message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec == T
     assert message.header.frame_id == value.sensor
-    assert bytes(ros.serialize_cdr(message, kind.schema)) == data
+    assert bytes(ros.serialize_cdr(message, codec.schema)) == data
 
 
 def test_estimate_is_the_standard_pose_with_covariance(ros):
@@ -95,14 +96,14 @@ def test_fields_of_any_kind_in_any_order_come_back_to_the_bit():
 
 @pytest.mark.parametrize("value", VALUES, ids=lambda value: type(value).__name__)
 def test_message_cut_off_at_any_byte_is_refused(value):
-    kind = KINDS[type(value)]
-    data = kind.encode(value)
-    assert kind.decode(data, value.seq) == value
+    codec = CODECS[type(value)]
+    data = codec.encode(value)
+    assert codec.decode(data, value.seq) == value
     for length in range(len(data)):
-        if kind.schema.startswith("sensor_msgs/") and length >= len(data) - 20 * 8:
+        if codec.schema.startswith("sensor_msgs/") and length >= len(data) - 20 * 8:
             break  # the gyro's rate and its covariance stand before 20 doubles that say nothing
         with pytest.raises((struct.error, ValueError)):
-            kind.decode(data[:length], value.seq)
+            codec.decode(data[:length], value.seq)
 
 
 def test_big_endian_message_is_refused():

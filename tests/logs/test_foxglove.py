@@ -11,7 +11,8 @@ from mcap.writer import Writer
 from fusion import Gyro, World
 from fusion.errors import ParameterError
 from logs.importers.rosbag import read_bag
-from logs.messages import KINDS, SCHEMAS
+from logs.messages import CODECS
+from logs.schemas import SCHEMAS
 
 SECOND = 1_000_000_000
 T = 1_652_380_260_171_842_098
@@ -99,7 +100,7 @@ def written(path, encoding, kind, *messages):
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start(profile="", library="motion capture")
-        gyro = KINDS[Gyro]
+        gyro = CODECS[Gyro]
         imu = writer.register_schema(gyro.schema, "ros2msg", SCHEMAS[gyro.schema].encode())
         turning = writer.register_channel("/imu", "cdr", imu)
         definition = definitions().SerializeToString() if encoding == "protobuf" else b"{}"

@@ -24,8 +24,9 @@ from fusion import (
     Update,
     World,
 )
-from logs.messages import KINDS, SCHEMAS
+from logs.messages import CODECS
 from logs.reader import read_run
+from logs.schemas import SCHEMAS
 from logs.writer import RUN_RECORD, RunWriter
 
 SECOND = 1_000_000_000
@@ -208,12 +209,12 @@ def foreign(path, record, *more):
         writer.start(profile="ros2")
         if record:
             writer.add_metadata(RUN_RECORD, record)
-        kind = KINDS[Gyro]
-        imu = writer.register_schema(kind.schema, "ros2msg", SCHEMAS[kind.schema].encode())
-        writer.add_message(writer.register_channel("/turning", "cdr", imu), SECOND, kind.encode(gyro(SECOND)), SECOND)
+        codec = CODECS[Gyro]
+        imu = writer.register_schema(codec.schema, "ros2msg", SCHEMAS[codec.schema].encode())
+        writer.add_message(writer.register_channel("/turning", "cdr", imu), SECOND, codec.encode(gyro(SECOND)), SECOND)
         other = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data\n")
         for topic, payload in more:
-            schema = imu if topic == kind.topic else other
+            schema = imu if topic == codec.topic else other
             writer.add_message(writer.register_channel(topic, "cdr", schema), SECOND, payload, SECOND)
         writer.finish()
     return path

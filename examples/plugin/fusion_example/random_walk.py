@@ -19,7 +19,7 @@ from fusion import (
     Tag,
     WifiScan,
     World,
-    sightings,
+    radio_readings,
 )
 from fusion.arrays import Floats
 
@@ -55,7 +55,7 @@ class RandomWalk:
         state = self.walked(state, motion)
         if scan is None:
             return state, ()
-        seen = sightings(self.world, scan)
+        seen = radio_readings(self.world, scan)
         x, y = state.position.tolist()
         expected = [one.expect(x, y, 0.0, self.antenna_m) for one in seen]
         innovation = np.array([one.value - other.value for one, other in zip(seen, expected, strict=True)])

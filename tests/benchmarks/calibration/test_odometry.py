@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from fusion import LogError, Odometry, Pose
 from fusion.odometry import Odometer
+from fusion.robot import Robot
 from fusion.values import nanoseconds
-from fusion.world import Robot
 from logs.truth import TruthTrack
 from sensors.calibration.arcs import Roll, arc_end
 from sensors.calibration.odometry import calibrate_odometry, fit_roll, halves, score_held_out

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.faults.inject import apply_faults, fault_seed, outages, read_fault, stable_hash
 from benchmarks.faults.message_faults import Clock, Delay, Drop, GyroDrop
-from benchmarks.faults.motion_faults import WHEELS, BadStart, Freeze, GyroBias, Kidnap, Slip
+from benchmarks.faults.motion_faults import BadStart, Freeze, GyroBias, Kidnap, Slip
 from benchmarks.faults.radio_faults import Nlos, Outlier, PowerStep, RssiNoise
 from benchmarks.metrics.matching import match
 from benchmarks.metrics.score import errors
@@ -28,12 +28,11 @@ from fusion import (
     built_in_names,
     load,
 )
-from fusion.conformance.synthetic_run import Drive
+from fusion.conformance.synthetic_run import SyntheticRun
 from fusion.odometry import Odometer
 from fusion.plugins import FAULTS
 from fusion.timeline import order
 from fusion.values import nanoseconds, seconds
-from fusion.world import DRIVES
 from logs.prior import starting_prior
 from logs.run import Run
 from logs.truth import evaluation_instants
@@ -49,7 +48,7 @@ SCENARIO = replace(
 )
 RUN = simulated_run(SCENARIO, 3)
 """Wheel ticks, gyro, Wi-Fi and ranges; its first stamp is 0.02 s."""
-DRIVE = Drive(noisy=True, duration_s=20.0)
+DRIVE = SyntheticRun(noisy=True, duration_s=20.0)
 INCREMENTS = Run(Path("drive.mcap"), "drive", DRIVE.world(), None, {}, DRIVE.measurements(), None, (), {})
 """Increments of odometry, gyro, Wi-Fi and ranges."""
 START_NS = RUN.measurements[0].time_ns
@@ -583,10 +582,6 @@ def test_increment_slips_as_the_wheels_it_was_made_of_would():
     assert (half.distance_m, half.turn_rad) == pytest.approx((0.085, 0.07 / 0.15))
     (one_of_two,) = with_faults(Slip(0.5, "rear_left"), run=replace(RUN, measurements=(odometry,))).measurements
     assert one_of_two.distance_m == pytest.approx(0.5 * (0.075 + 0.12))
-
-
-def test_wheels_have_names_in_the_order_of_the_world():
-    assert {drive: len(names) for drive, names in WHEELS.items()} == DRIVES
 
 
 def test_increments_of_a_robot_without_wheels_slip_as_a_whole():

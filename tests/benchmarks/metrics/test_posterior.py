@@ -24,7 +24,7 @@ from fusion import (
     WifiScan,
     World,
 )
-from fusion.conformance.synthetic_run import Drive
+from fusion.conformance.synthetic_run import SyntheticRun
 from fusion.motion import step_noise
 from fusion.values import NANOSECONDS
 from logs.run import Run
@@ -73,7 +73,7 @@ def test_each_axis_follows_the_scalar_recursion():
 
 def circle(**tables):
     """A known drive on a circle, truth with heading at the odometry's stamps."""
-    drive = Drive(duration_s=12.0)
+    drive = SyntheticRun(duration_s=12.0)
     table = json.loads(drive.world().table) | tables
     truths = [Truth(k * NANOSECONDS // 10, *drive.pose(k * NANOSECONDS // 10)) for k in range(121)]
     return a_run(World.from_table(table), drive.measurements(), truths, drive.prior())
@@ -156,7 +156,7 @@ def test_readings_that_never_came_raise_the_bound():
 
 def test_turned_world_has_the_same_bound():
     """The heading passes pi on the way, between two truths with a reading between them."""
-    straight, turned = Drive(duration_s=6.0), Drive(duration_s=6.0, map_from_room=Pose(3.0, -2.0, 2.5))
+    straight, turned = SyntheticRun(duration_s=6.0), SyntheticRun(duration_s=6.0, map_from_room=Pose(3.0, -2.0, 2.5))
     found = []
     for drive in (straight, turned):
         truths = [Truth(3 * k * NANOSECONDS // 10, *drive.pose(3 * k * NANOSECONDS // 10)) for k in range(21)]
@@ -191,7 +191,7 @@ def test_run_without_truth_is_refused_with_the_remedy():
 
 def test_instants_are_those_of_the_scores_and_the_time_before_the_prior_is_undefined():
     run = circle()
-    late = dataclasses.replace(run, prior=run.prior.__class__(NANOSECONDS, *_rest(Drive(), NANOSECONDS)))
+    late = dataclasses.replace(run, prior=run.prior.__class__(NANOSECONDS, *_rest(SyntheticRun(), NANOSECONDS)))
     found = posterior_bound(late)
     assert found.time_ns.tolist() == evaluation_instants(run.truth).time_ns.tolist()
     assert np.isnan(found.error_m).tolist() == (found.time_ns < NANOSECONDS).tolist()
@@ -203,7 +203,7 @@ def _rest(drive, time_ns):
 
 def noisy(seed):
     """The circle with noise exactly as the world says: start, odometry, ranges four times a second."""
-    drive, chance = Drive(duration_s=12.0, odometry_hz=4), np.random.default_rng(seed)
+    drive, chance = SyntheticRun(duration_s=12.0, odometry_hz=4), np.random.default_rng(seed)
     tables = {"ranging": white(), "robot": {"noise": EXACT}}
     world = World.from_table(json.loads(drive.world().table) | tables)
     pose, covariance = drive.pose(0), Covariance.from_std(0.1, 0.1, 0.1)

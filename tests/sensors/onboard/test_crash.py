@@ -13,12 +13,12 @@ from itertools import pairwise
 from fusion import BootClock
 from fusion.values import Gyro, seconds
 from logs.message_stream import Walk
-from logs.messages import KINDS
+from logs.messages import CODECS
 from logs.reader import read_run
 from logs.writer import LOSS_NS
 from tests.sensors.virtual_drive import START_NS, virtual_drive
 
-GYRO = KINDS[Gyro].topic
+GYRO = CODECS[Gyro].topic
 COPIES = 15
 BUSY_S = 0.2
 """What a crash may cost beyond the second: the longest time of a batch."""
