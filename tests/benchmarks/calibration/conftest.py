@@ -61,10 +61,10 @@ def _rssi_run(points, values, *, world=None, turned=0.0, each=5):
         {"anchors": anchors, "bounds": {"x_min": -20.0, "x_max": 20.0, "y_min": -20.0, "y_max": 20.0}}
     )
     scans, truths = [], []
-    for i, (point, heard) in enumerate(zip(np.asarray(points) @ spin.T, values, strict=True)):
+    for i, (point, received) in enumerate(zip(np.asarray(points) @ spin.T, values, strict=True)):
         for k in range(each):
             time = (i * each + k) * 10**9
-            told = tuple(RssiReading(a["id"], float(v)) for a, v in zip(anchors, heard, strict=True))
+            told = tuple(RssiReading(a["id"], float(v)) for a, v in zip(anchors, received, strict=True))
             scans.append(WifiScan(time, "wifi", i * each + k, told))
             truths.append(Truth(time, float(point[0]), float(point[1]), 0.0))
     track = TruthTrack.from_truths(truths)
@@ -85,5 +85,5 @@ def scaled_gyro():
 
 @pytest.fixture(scope="session")
 def rssi_run():
-    """A run from surveyed points and the values heard there."""
+    """A run from surveyed points and the values received there."""
     return _rssi_run
