@@ -74,7 +74,7 @@ class Loop(ABC, Generic[Result]):
 
     @abstractmethod
     def _refused(self, refusal: OSError) -> Trouble | None:
-        """Heed the kernel's refusal, or raise what the keeper or a person must see to."""
+        """Heed the kernel's refusal, or raise what the lifecycle or a person must see to."""
 
     @abstractmethod
     def _drop(self) -> None:

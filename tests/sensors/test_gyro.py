@@ -150,9 +150,9 @@ def stand(rates, *, moving=(), sensor="gyro"):
     watch, told, count = Standstill(), [], 0
     for half in range(len(rates) // 10):
         for i, rate in enumerate(rates[10 * half : 10 * half + 10]):
-            told += watch.hear(Gyro(half * 500_000_000 + i * 50_000_000 + 1, sensor, i, rate))
+            told += watch.take(Gyro(half * 500_000_000 + i * 50_000_000 + 1, sensor, i, rate))
         count += half // 2 in moving
-        told += watch.hear(WheelTicks((half + 1) * 500_000_000, "wheels", half, (count, count)))
+        told += watch.take(WheelTicks((half + 1) * 500_000_000, "wheels", half, (count, count)))
     return told
 
 

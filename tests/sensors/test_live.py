@@ -270,7 +270,7 @@ def test_what_cannot_be_is_refused_before_anything_runs(robot, tmp_path):
         live(one, "ekf", options={"gate_probabillity": 0.9})
     with pytest.raises(PluginError, match="did you mean 'particle'"):
         live(one, "ekf", shadows=["partikle"], folder=folder)
-    with pytest.raises(ParameterError, match="nobody would hear it"):
+    with pytest.raises(ParameterError, match="its estimates go into a log alone"):
         live(one, "ekf", shadows=["particle"])
     with pytest.raises(ParameterError, match="runs already"):
         live(one, "ekf", shadows=["ekf"], folder=folder)

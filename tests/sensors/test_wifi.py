@@ -21,7 +21,7 @@ from fusion.errors import (
     UnsupportedError,
 )
 from fusion.values import WifiScan, nanoseconds, seconds
-from sensors.onboard.driver_lifecycle import Keeper, State
+from sensors.onboard.driver_lifecycle import DriverLifecycle, State
 from sensors.wifi.discovery import discover, discover_ranging, may_scan
 from sensors.wifi.loop import FAILURES_TO_STUCK
 from sensors.wifi.nl80211_fake import INDEX, WIPHY, FakeKernel, three_access_points
@@ -336,7 +336,7 @@ def test_a_radio_that_does_not_answer_ends_in_a_call_for_a_person(code):
     with pytest.raises(UnsupportedError, match="3 times in a row") as caught:
         listen(driver, 60.0)
     assert "modprobe -r" in caught.value.hint
-    assert not caught.value.passes, "the keeper must not try for ever"
+    assert not caught.value.passes, "the lifecycle must not try for ever"
     assert len(asked(kernel, Command.TRIGGER_SCAN)) == FAILURES_TO_STUCK
 
 
@@ -463,15 +463,15 @@ def test_without_pyroute2_the_error_says_what_to_install(monkeypatch):
 
 def test_unplugged_in_the_middle_of_a_scan_it_is_lost_and_the_keeper_brings_it_back_with_one_word_each_way():
     kernel = FakeKernel()
-    keeper = Keeper("wifi", wifi(kernel), kernel.clock)
+    lifecycle = DriverLifecycle("wifi", wifi(kernel), kernel.clock)
     for _ in range(2):
-        keeper.turn(POLL_S)
+        lifecycle.step(POLL_S)
     kernel.unplug()
-    said = [one.said for _ in range(600) for one in keeper.turn(POLL_S)]
+    said = [one.output for _ in range(600) for one in lifecycle.step(POLL_S)]
     assert [one.level for one in said] == [Level.WARN]
-    assert keeper.state is State.BACKOFF
+    assert lifecycle.state is State.BACKOFF
     kernel.is_there = True
-    said = [one.said for _ in range(600) for one in keeper.turn(POLL_S)]
+    said = [one.output for _ in range(600) for one in lifecycle.step(POLL_S)]
     assert sum("is back" in one.text for one in diagnostics(said)) == 1
     assert len(scans(said)) > 10
 
