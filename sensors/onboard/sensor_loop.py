@@ -119,7 +119,7 @@ class SensorLoop:
 
     @property
     def warning(self) -> str:
-        """What makes the measurements misleading though every sensor may do well, "" where nothing is known to."""
+        """Cause that makes the measurements misleading though every sensor may do well, "" where none is known."""
         return str(self._direction.caution or "")
 
     def statuses(self) -> Sequence[Status]:

@@ -226,7 +226,7 @@ def test_the_end_of_an_earlier_scan_is_not_taken_for_ours():
 
         def _scan(self, frequencies_mhz, index, *, is_seen=True):
             about = {"IFINDEX": INDEX, "WIPHY": WIPHY}
-            self.say(encode(Message(Command.SCAN_ABORTED, about), 28))
+            self.emit(encode(Message(Command.SCAN_ABORTED, about), 28))
             super()._scan(frequencies_mhz, index, is_seen=is_seen)
 
     said = listen(opened(Racing()), 0.4)
@@ -246,9 +246,9 @@ def test_somebody_s_scan_between_two_of_ours_changes_nothing():
 def test_other_interfaces_events_mean_nothing():
     kernel = FakeKernel()
     driver = opened(kernel, frequencies_mhz=[2412])
-    kernel.say(encode(Message(Command.NEW_SCAN_RESULTS, {"IFINDEX": 99, "WIPHY": 9}), 28))
-    kernel.say(encode(Message(Command.SCAN_ABORTED, {}), 28))
-    kernel.say(encode(Message(Command.NEW_INTERFACE, {"IFINDEX": INDEX}), 28))
+    kernel.emit(encode(Message(Command.NEW_SCAN_RESULTS, {"IFINDEX": 99, "WIPHY": 9}), 28))
+    kernel.emit(encode(Message(Command.SCAN_ABORTED, {}), 28))
+    kernel.emit(encode(Message(Command.NEW_INTERFACE, {"IFINDEX": INDEX}), 28))
     assert len(listen(driver, 0.3)) == 2
 
 
@@ -497,7 +497,7 @@ def make_trouble(kernel, data):
     elif action == "never":
         kernel.end = None
     elif action == "garble":
-        kernel.say(data.draw(st.binary(min_size=1, max_size=40)))
+        kernel.emit(data.draw(st.binary(min_size=1, max_size=40)))
     elif action == "refuse":
         kernel.refusals[Command.TRIGGER_SCAN] = data.draw(st.sampled_from([5, 11, 16, 22, 100, 110]))
     elif action == "heal":

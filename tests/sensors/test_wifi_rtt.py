@@ -130,7 +130,7 @@ def test_the_end_of_another_s_round_is_not_ours():
     kernel = FakeKernel()
     driver = opened(kernel)
     for command in (Command.PEER_MEASUREMENT_RESULT, Command.PEER_MEASUREMENT_COMPLETE):
-        kernel.say(encode(Message(command, {"IFINDEX": INDEX, "COOKIE": 999, **answer()}), 28))
+        kernel.emit(encode(Message(command, {"IFINDEX": INDEX, "COOKIE": 999, **answer()}), 28))
     ranges, _ = listen(driver, 0.2)
     assert len(ranges.readings) == 3
 
