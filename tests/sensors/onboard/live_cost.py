@@ -1,7 +1,7 @@
 """What a live pose costs: processor seconds a second, of the whole process with its simulated sensors.
 
 Gyro at 100 Hz, which gives the turn, encoders at 20 Hz, Wi-Fi at 2 Hz, a pose 10 times a second. Run it from the top
-folder: ``python tests/sensors/live_cost.py [SECONDS]``.
+folder: ``python tests/sensors/onboard/live_cost.py [SECONDS]``.
 """
 
 import sys

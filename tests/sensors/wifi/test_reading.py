@@ -22,7 +22,7 @@ from sensors.wifi.reading import (
 )
 
 MS = 1_000_000
-RECORDINGS = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "wifi"
+RECORDINGS = Path(__file__).resolve().parents[4] / "shared" / "data" / "wifi"
 RECORDED = RECORDINGS / "nl80211_get_scan_hwsim_3ap_pos1_1.hex"
 
 
