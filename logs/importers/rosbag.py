@@ -163,11 +163,8 @@ def _radio(topic: Topic, anchor: str) -> Arrived[Measurement]:
 
 
 def _truths(bag: Bag, assignment: TopicAssignment, map_from_truth: Pose) -> Arrived[Truth]:
-    topics = (
-        [assignment.topics["truth"]]
-        if "truth" in assignment.topics
-        else [bag.topics[name] for name in assignment.transforms]
-    )
+    named = assignment.topics.get("truth")
+    topics = [named] if named else [bag.topics[name] for name in assignment.transforms]
     rows = []
     for arrived_ns, sample in (row for topic in topics for row in topic.samples):
         if isinstance(sample, PoseSample):

@@ -15,13 +15,12 @@ LENGTHS, SHARES = 10, (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 def blocks(medians: PlaceMedians, length_m: float, share: float) -> list[tuple[Whole, Floats]]:
-    """Rows of each anchor and the correlation matrix of what is left of them; anchors are independent."""
+    """Rows of each anchor and the correlation matrix of their residuals; anchors are independent."""
     parts = []
     for anchor in np.unique(medians.anchor):
         rows = np.flatnonzero(medians.anchor == anchor)
-        away = np.hypot(
-            np.subtract.outer(medians.x[rows], medians.x[rows]), np.subtract.outer(medians.y[rows], medians.y[rows])
-        )
+        x, y = medians.x[rows], medians.y[rows]
+        away = np.hypot(np.subtract.outer(x, x), np.subtract.outer(y, y))
         parts.append((rows, (1.0 - share) * np.exp(-away / length_m) + share * np.eye(len(rows))))
     return parts
 

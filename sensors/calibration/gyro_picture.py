@@ -27,16 +27,14 @@ def draw(calibration: GyroCalibration) -> Figure:
 
 def _draw_bias(axes: Axes, calibration: GyroCalibration) -> None:
     label(axes, "Bias at each standstill", "since the first, s", "mean rate at rest, °/s")
-    stops = calibration.standstills
+    stops, bias = calibration.standstills, calibration.bias
     middles = np.array([0.5 * (stop.from_ns + stop.until_ns) for stop in stops]) / NANOSECONDS
     reach = [stop.scatter / np.sqrt(stop.samples) for stop in stops]
     rates = np.degrees([stop.bias for stop in stops])
     axes.errorbar(middles - middles.min(), rates, np.degrees(reach), fmt="o", color=plain(BLUE), markersize=4)
-    axes.axhline(float(np.degrees(calibration.bias.value)), color=plain(VERMILLION))
-    if np.isfinite(calibration.bias.reach):
-        low, high = np.degrees(
-            [calibration.bias.value - calibration.bias.reach, calibration.bias.value + calibration.bias.reach]
-        )
+    axes.axhline(float(np.degrees(bias.value)), color=plain(VERMILLION))
+    if np.isfinite(bias.reach):
+        low, high = np.degrees([bias.value - bias.reach, bias.value + bias.reach])
         axes.axhspan(low, high, color=plain(VERMILLION), alpha=0.15, linewidth=0)
 
 

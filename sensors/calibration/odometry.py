@@ -23,7 +23,7 @@ from fusion.world import Robot
 from logs.run import Run
 from sensors.calibration.arcs import WheelScales, arc_end, turn_rad
 from sensors.calibration.held_out import BeforeAfter, Interval, root_mean_square
-from sensors.calibration.segments import STRAIGHT, find_segments, read_segments
+from sensors.calibration.segments import STRAIGHT, Segment, find_segments, read_segments
 from sensors.calibration.umbmark import Square, Umbmark, find_squares, judge
 from sensors.calibration.wheel_residuals import LinearFit, MeasuredSegment, linear_trend, measured_segments
 from sensors.calibration.wheels import Wheels, nominal, wheels
@@ -240,19 +240,14 @@ def _umbmark(
     track_m: float,
 ) -> tuple[Umbmark, Umbmark] | None:
     """Squares are judged by a fit to what lies outside them; None without squares in both senses, or the rest."""
-    outside = [
-        each
-        for each in pieces
-        if not any(
-            square.run == each.segment.run
-            and square.from_ns < each.segment.until_ns
-            and each.segment.from_ns < square.until_ns
-            for square in squares
-        )
-    ]
+    outside = [each for each in pieces if not any(_overlap(square, each.segment) for square in squares)]
     was = judge(before, squares, runs, track_m)
     try:
         now = judge(fit_scales(outside, track_m, linear_trend(outside)).scales, squares, runs, track_m)
     except LogError:
         return None
     return None if was is None or now is None else (was, now)
+
+
+def _overlap(square: Square, segment: Segment) -> bool:
+    return square.run == segment.run and square.from_ns < segment.until_ns and segment.from_ns < square.until_ns

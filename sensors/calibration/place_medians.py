@@ -31,16 +31,7 @@ class PlaceMedians(NamedTuple):
 
     def at(self, rows: Flags) -> PlaceMedians:
         """Some of them; the scatter stays."""
-        return PlaceMedians(
-            self.anchor[rows],
-            self.place[rows],
-            self.value[rows],
-            self.gain[rows],
-            self.x[rows],
-            self.y[rows],
-            self.size[rows],
-            self.scatter,
-        )
+        return self._replace(**{key: each[rows] for key, each in self._asdict().items() if key != "scatter"})
 
 
 def place_medians(readings: Readings, slope: float) -> PlaceMedians:
@@ -57,6 +48,5 @@ def place_medians(readings: Readings, slope: float) -> PlaceMedians:
     left = np.abs(level - middle[row])[count[row] > 1]
     fair = math.sqrt(float(count[count > 1].sum()) / max(float((count[count > 1] - 1).sum()), 1.0))
     scatter = NORMAL * fair * float(np.median(left)) if len(left) else 0.0
-    return PlaceMedians(
-        readings.anchor[first], readings.place[first], middle + slope * gain, gain, x, y, count, scatter
-    )
+    anchor, place = readings.anchor[first], readings.place[first]
+    return PlaceMedians(anchor, place, middle + slope * gain, gain, x, y, count, scatter)

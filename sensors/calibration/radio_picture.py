@@ -36,36 +36,28 @@ def draw(world: World, calibrations: Sequence[RadioCalibration]) -> Figure:
 def _draw_line(axes: Axes, world: World, calibration: RadioCalibration) -> None:
     label(axes, f"{calibration.kind}: places and the common line", "distance, m", VALUES[calibration.kind])
     distances, reach = _distances(calibration), np.geomspace(*_ends(calibration), 200)
+    medians, line = calibration.medians, calibration.line
     off = 1.0 if calibration.kind == "range" else 0.0  # over metres of range, its error cannot be seen
     for i, anchor in enumerate(world.anchors):
-        rows = calibration.medians.anchor == i
+        rows = medians.anchor == i
         if rows.any():
-            colour = plain(anchor_colour(world, anchor.id))
-            axes.plot(
-                distances[rows],
-                calibration.medians.value[rows] - off * distances[rows],
-                ".",
-                color=colour,
-                markersize=4,
-                label=anchor.id,
-            )
-            model = calibrated(
-                model_of(anchor, calibration.kind), calibration.line.gain, float(calibration.line.levels[i])
-            )
+            colour, at = plain(anchor_colour(world, anchor.id)), distances[rows]
+            axes.plot(at, medians.value[rows] - off * at, ".", color=colour, markersize=4, label=anchor.id)
+            model = calibrated(model_of(anchor, calibration.kind), line.gain, float(line.levels[i]))
             axes.plot(reach, model.expected(reach) - off * reach, color=colour, linewidth=1.0)
     axes.legend(fontsize=7, ncols=2)
 
 
 def _draw_left(axes: Axes, world: World, calibration: RadioCalibration) -> None:
-    unit, line = UNITS[calibration.kind], calibration.line
+    unit, line, medians = UNITS[calibration.kind], calibration.line, calibration.medians
     label(axes, f"Residuals; σ between places {line.place_std:.2g} {unit}", "distance, m", f"residual, {unit}")
-    left = calibration.medians.value - line.gain * calibration.medians.gain - line.levels[calibration.medians.anchor]
+    left = medians.value - line.gain * medians.gain - line.levels[medians.anchor]
     distances = _distances(calibration)
     axes.axhline(0.0, color="0.6", linewidth=0.8)
     for sign in (-2.0, 2.0):
         axes.axhline(sign * line.place_std, color="0.6", linewidth=0.8, linestyle="--")
     for i, anchor in enumerate(world.anchors):
-        rows = calibration.medians.anchor == i
+        rows = medians.anchor == i
         axes.plot(distances[rows], left[rows], ".", color=plain(anchor_colour(world, anchor.id)), markersize=4)
 
 

@@ -31,6 +31,10 @@ PLACE_M, PLACES_ACROSS = 1.0, 16
 MOST_PLACES = 200
 
 
+COLUMNS = ("anchor", "value", "distance_m", "gain", "x", "y", "place")
+"""Those of `Readings`, one row for each reading."""
+
+
 class Readings(NamedTuple):
     """Columns (n,) in the order of time: index into ``names``, its value [dBm or m], the distance between both
     antennas [m], the model's gain (`DistanceModel.by_gain`) there, where the robot was [m], and its place, from 0.
@@ -51,18 +55,7 @@ class Readings(NamedTuple):
 
     def at(self, rows: Flags) -> Readings:
         """Some of them."""
-        return Readings(
-            self.names,
-            self.anchor[rows],
-            self.value[rows],
-            self.distance_m[rows],
-            self.gain[rows],
-            self.x[rows],
-            self.y[rows],
-            self.place[rows],
-            self.place_m,
-            self.received,
-        )
+        return self._replace(**{key: getattr(self, key)[rows] for key in COLUMNS})
 
 
 def model_of(anchor: Anchor, kind: Kind) -> DistanceModel:

@@ -187,11 +187,9 @@ def read_segments(path: Path, run: Run, number: int) -> list[Segment]:
     segments = []
     for row in read_table(path, ("from_s", "until_s", "distance_m", "turn_rad")):
         begin, end = start + row.time_ns("from_s"), start + row.time_ns("until_s")
-        values = [row.number(key) if row.text(key) else math.nan for key in ("distance_m", "turn_rad")]
-        if end <= begin or all(map(math.isnan, values)) or not all(math.isfinite(t) or math.isnan(t) for t in values):
+        distance, turn = (row.number(key) if row.text(key) else math.nan for key in ("distance_m", "turn_rad"))
+        if end <= begin or math.isinf(distance) or math.isinf(turn) or (math.isnan(distance) and math.isnan(turn)):
             raise LogError(f"{row.place}: give until_s after from_s, and a finite distance_m or turn_rad; correct it")
-        kind = (
-            SPIN if math.isnan(values[0]) else STRAIGHT if math.isnan(values[1]) or abs(values[1]) < LEAST_RAD else ARC
-        )
-        segments.append(Segment(number, kind, begin, end, *values))
+        kind = SPIN if math.isnan(distance) else STRAIGHT if math.isnan(turn) or abs(turn) < LEAST_RAD else ARC
+        segments.append(Segment(number, kind, begin, end, distance, turn))
     return segments

@@ -84,9 +84,8 @@ def _steps(robot: Robot, measurements: list[Odometry | WheelTicks | MotorCommand
     if not measurements:
         return []
     odometer, steps = Odometer(robot), list[Odometry]()
-    state = odometer.start(
-        measurements[0].time_ns if not isinstance(measurements[0], Odometry) else measurements[0].from_ns
-    )
+    first = measurements[0]
+    state = odometer.start(first.from_ns if isinstance(first, Odometry) else first.time_ns)
     for measurement in measurements:
         state, motion = odometer.advance(state, measurement)
         steps += [step for step in motion if isinstance(step, Odometry) and step.time_ns > step.from_ns]

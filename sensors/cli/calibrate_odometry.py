@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -35,26 +34,22 @@ def findings(runs: Sequence[Run], segments: Path | None = None) -> Findings:
         "diameter_ratio": robot.diameter_ratio,
         "track_width_m": robot.track_width_m,
     }
-    errors = residuals(calibration.fit.scales, calibration.pieces)[0]
+    pieces, scales, trend = calibration.pieces, calibration.fit.scales, calibration.trend
     return Findings(
         name="odometry",
         method=METHOD,
-        samples=len(calibration.pieces),
-        residual_std=float(np.nanstd(errors)),
+        samples=len(pieces),
+        residual_std=float(np.nanstd(residuals(scales, pieces)[0])),
         sheets=_sheets(calibration),
         remarks=_remarks(calibration),
         result={
             "numbers": calibration.numbers,
-            "trend": None
-            if calibration.trend is None
-            else {"scale": calibration.trend.scale, "offset_m": calibration.trend.offset_m},
+            "trend": None if trend is None else {"scale": trend.scale, "offset_m": trend.offset_m},
             "held_out": calibration.scores,
             "umbmark": calibration.umbmark,
-            "segments": [each.segment for each in calibration.pieces],
+            "segments": [each.segment for each in pieces],
         },
-        draw=partial(
-            draw, calibration.trend, calibration.pieces, WheelScales.of(calibration.robot), calibration.fit.scales
-        ),
+        draw=partial(draw, trend, pieces, WheelScales.of(calibration.robot), scales),
         changes=None if calibration.ready_made else {"robot": changes},
         anchors={},
     )
@@ -63,10 +58,8 @@ def findings(runs: Sequence[Run], segments: Path | None = None) -> Findings:
 def _sheets(calibration: OdometryCalibration) -> list[Sheet]:
     was = WheelScales.of(calibration.robot)
     before = (was.left, was.right, 0.5 * (was.left + was.right), was.right / was.left, was.track_m)
-    rows = [
-        (name, f"{old:.4f}", number.text(4))
-        for (name, number), old in zip(calibration.numbers.items(), before, strict=True)
-    ]
+    numbers = zip(calibration.numbers.items(), before, strict=True)
+    rows = [(name, f"{old:.4f}", number.text(4)) for (name, number), old in numbers]
     if calibration.trend is not None:
         rows += [
             ("the paper's line: scale", "", calibration.trend.scale.text(4)),
@@ -93,10 +86,8 @@ def _remarks(calibration: OdometryCalibration) -> list[str]:
             f"the paper's line does not pass through zero, its offset is {calibration.trend.offset_m.text(3)} m: "
             "wheels that slip at each start, or a truth that lags behind; the fit and the world have no such offset"
         )
-    senses = {
-        math.copysign(1.0, each.segment.turn_rad) for each in calibration.pieces if abs(each.segment.turn_rad) > 0.5
-    }
-    if len(senses) == 1:
+    turns = [each.segment.turn_rad for each in calibration.pieces if abs(each.segment.turn_rad) > 0.5]
+    if turns and (min(turns) > 0.0 or max(turns) < 0.0):
         remarks.append("all turns go one way: unequal wheels and a wrong track look alike; turn the other way as often")
     if calibration.ready_made:
         remarks.append(

@@ -69,12 +69,11 @@ def _row(lifecycle: DriverLifecycle, outputs: Sequence[Received]) -> dict[str, A
     measured = [one for one in outputs if not isinstance(one.output, Diagnostic)]
     intervals = [seconds(later.output.time_ns - earlier.output.time_ns) for earlier, later in pairwise(measured)]
     ages = [seconds(one.received_ns - one.output.time_ns) for one in measured]
+    info = lifecycle.info
     return {
         "state": lifecycle.state.value,
         "error": str(lifecycle.error or ""),
-        "device": None
-        if lifecycle.info is None
-        else {**lifecycle.info._asdict(), "settings": dict(lifecycle.info.settings)},
+        "device": info and {**info._asdict(), "settings": dict(info.settings)},
         "nominal_hz": lifecycle.driver.spec.nominal_hz,
         "messages": len(measured),
         "rate_hz": len(intervals) / sum(intervals) if sum(intervals) > 0.0 else None,

@@ -1,7 +1,7 @@
 """A recording as a series of logs, each whole by itself: world, robot file, devices and clocks stand in every one.
 
 Files are called ``NAME-BOOT-NUMBER.mcap``: the number goes on where the last recording of this boot ended, so nothing
-is ever overwritten and a wall clock that is wrong confuses nobody. Only the first file of a recording knows where the
+is ever overwritten and a wall clock that is wrong does no harm. Only the first file of a recording knows where the
 robot stood at the start; `fusion join` makes one log of them all.
 """
 

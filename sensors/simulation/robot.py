@@ -182,9 +182,8 @@ class SimulatedRobot:
             name: channel.rssi_dbm(moment.pose, stream, count) - self._obstruction_db()
             for name, channel in self._channels.items()
         }
-        return WifiScan(
-            moment.time_ns, "wifi", step, tuple(RssiReading(n, r) for n, r in strengths.items() if r >= deaf)
-        )
+        readings = tuple(RssiReading(name, rssi) for name, rssi in strengths.items() if rssi >= deaf)
+        return WifiScan(moment.time_ns, "wifi", step, readings)
 
     def _obstruction_db(self) -> float:
         """Loss by people and things in the way of one link, for one scan or one stop [dB]."""

@@ -65,11 +65,9 @@ class SensorFault:
             return None
         if kind == "clock_jump" and lasts:
             jumped_ns = message.time_ns + nanoseconds(self._window.amount)
-            return (
-                message._replace(time_ns=jumped_ns)
-                if isinstance(message, Truth)
-                else replace(message, time_ns=jumped_ns)
-            )
+            if isinstance(message, Truth):
+                return message._replace(time_ns=jumped_ns)
+            return replace(message, time_ns=jumped_ns)
         return message
 
     def _miscounted(self, message: WheelTicks, share: float) -> WheelTicks:

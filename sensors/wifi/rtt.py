@@ -96,11 +96,8 @@ class WifiRtt(WifiDriver[Round]):
         if not readings:
             return [diagnostic]
         answered_ns = (one.time_ns for one in attempts if one.time_ns is not None and one.time_ns <= result.done_ns)
-        self._seq += 1
-        return [
-            Ranges(max(answered_ns, default=result.done_ns), self._name, self._seq - 1, tuple(readings)),
-            diagnostic,
-        ]
+        time_ns, self._seq = max(answered_ns, default=result.done_ns), self._seq + 1
+        return [Ranges(time_ns, self._name, self._seq - 1, tuple(readings)), diagnostic]
 
     def _diagnostic(self, attempts: list[Attempt], measured: int, done_ns: int) -> Diagnostic:
         values = [("round", str(self._rounds - 1)), *((self._anchors[one.bssid], _in_words(one)) for one in attempts)]
