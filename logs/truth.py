@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fusion import Truth
 from fusion.arrays import Flags, Floats, Points, Stamps, Whole, points

@@ -1,4 +1,4 @@
-"""What the kernel's refusals mean for a device: one table for every driver that opens a file under /dev or /sys."""
+"""Errors for the kernel's refusals of a device: one table for every driver that opens a file under /dev or /sys."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from fusion import (
 )
 
 ABSENT = (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EREMOTEIO)
-"""No such file, no such device, or nobody at that address of the bus (EREMOTEIO; ENXIO on some adapters)."""
+"""No such file, no such device, or no chip at that address of the bus (EREMOTEIO; ENXIO on some adapters)."""
 DENIED = (errno.EACCES, errno.EPERM)
 INSTALL = 'python3 -m pip install "fusion-localization[sensors]"'
-"""What brings in the packages that drivers need."""
+"""Command that installs the packages of the drivers."""
 
 
 def missing_package(name: str) -> DependencyError:

@@ -39,7 +39,7 @@ NOISE_STD = (0.1, 2.0)
 
 @dataclass(frozen=True, slots=True)
 class SyntheticRun:
-    """Path of the robot, and the noise and rates of its sensors. ``map_from_room`` turns and moves everything together."""
+    """Path of the robot, noise and rates of its sensors. ``map_from_room`` turns and moves everything together."""
 
     duration_s: float = 20.0
     speed_m_s: float = 0.5

@@ -19,7 +19,7 @@ from fusion.values import seconds
 from logs.cli.info_text import info_text
 from logs.devices import complaints, devices, dropped, wall_clock
 from logs.importers.bag import open_bag
-from logs.importers.roles import roles_of
+from logs.importers.topic_assignment import roles_of
 from logs.prior import begin_ns
 from logs.reader import holds_run, read_log
 from logs.run import Run

@@ -19,8 +19,8 @@ from fusion.timeline import order
 from logs.importers.bag import TRANSFORM_TYPES, Bag, Keep, Topic, open_bag
 from logs.importers.foreign_recording import Recording
 from logs.importers.increments import pose_increments, wheel_increments
-from logs.importers.roles import ROLES, Cast, assign, truth_frames
 from logs.importers.samples import ODOMETRY, PoseSample, RangeSample, Sample
+from logs.importers.topic_assignment import ROLES, TopicAssignment, assign, truth_frames
 from logs.prior import prior_from_truth
 from logs.run import Run
 from logs.truth import TruthTrack
@@ -79,9 +79,9 @@ def read_recording(
 ) -> Recording:
     """What `read_bag` reads, with the times of arrival."""
     bag = open_bag(path, keep=_keeper(truth_frames(topics)))
-    cast = assign(bag, world, topics)
-    measurements, warnings = _measurements(bag, cast, world)
-    truths = _truths(bag, cast, _frame(truth_to_map))
+    assignment = assign(bag, world, topics)
+    measurements, warnings = _measurements(bag, assignment, world)
+    truths = _truths(bag, assignment, _frame(truth_to_map))
     if not measurements and not truths:
         held = ", ".join(bag.topics) or "no topics"
         raise LogError(f"{path}: no message of it is of use ({held}); see `fusion info`, and name the topics")
@@ -89,8 +89,8 @@ def read_recording(
         warnings.append("holds no measurements")
     measurements.sort(key=lambda row: (row[0], order(row[1])))
     truths.sort(key=lambda row: row[0])
-    doubts = [f"{path}: {doubt}" for doubt in (*_doubts(bag, cast, world, topics), *warnings)]
-    return _recording(path, world, measurements, truths, str(cast), [*bag.warnings, *doubts])
+    doubts = [f"{path}: {doubt}" for doubt in (*_doubts(bag, assignment, world, topics), *warnings)]
+    return _recording(path, world, measurements, truths, str(assignment), [*bag.warnings, *doubts])
 
 
 def _frame(numbers: Sequence[float]) -> Pose:
@@ -115,11 +115,11 @@ def _recording(
     world: World,
     measurements: Arrived[Measurement],
     truths: Arrived[Truth],
-    cast: str,
+    assignment: str,
     warnings: Sequence[str],
 ) -> Recording:
     prior, how = prior_from_truth([m for _, m in measurements], [truth for _, truth in truths])
-    metadata = {"source": "rosbag", "topics": cast, "prior": how}
+    metadata = {"source": "rosbag", "topics": assignment, "prior": how}
     if warnings:
         metadata["warnings"] = "\n".join(warnings)
     return Recording(
@@ -134,18 +134,18 @@ def _recording(
     )
 
 
-def _measurements(bag: Bag, cast: Cast, world: World) -> tuple[Arrived[Measurement], list[str]]:
+def _measurements(bag: Bag, assignment: TopicAssignment, world: World) -> tuple[Arrived[Measurement], list[str]]:
     rows: Arrived[Measurement] = []
     warnings: list[str] = []
-    for role, topic in cast.topics.items():
+    for role, topic in assignment.topics.items():
         if role in ("gyro", "wifi"):
             rows += _radio(topic, "")
         elif role != "truth":
             wheels = role == "wheels"
-            found = wheel_increments(topic, cast.joints, world.robot) if wheels else pose_increments(topic)
+            found = wheel_increments(topic, assignment.joints, world.robot) if wheels else pose_increments(topic)
             rows += found.rows
             warnings += found.warnings
-    for name, anchor in cast.ranges:
+    for name, anchor in assignment.ranges:
         rows += _radio(bag.topics[name], anchor)
     return rows, warnings
 
@@ -162,8 +162,9 @@ def _radio(topic: Topic, anchor: str) -> Arrived[Measurement]:
     return rows
 
 
-def _truths(bag: Bag, cast: Cast, map_from_truth: Pose) -> Arrived[Truth]:
-    topics = [cast.topics["truth"]] if "truth" in cast.topics else [bag.topics[name] for name in cast.transforms]
+def _truths(bag: Bag, assignment: TopicAssignment, map_from_truth: Pose) -> Arrived[Truth]:
+    named = assignment.topics.get("truth")
+    topics = [named] if named else [bag.topics[name] for name in assignment.transforms]
     rows = []
     for arrived_ns, sample in (row for topic in topics for row in topic.samples):
         if isinstance(sample, PoseSample):
@@ -172,12 +173,12 @@ def _truths(bag: Bag, cast: Cast, map_from_truth: Pose) -> Arrived[Truth]:
     return rows
 
 
-def _doubts(bag: Bag, cast: Cast, world: World, topics: Mapping[str, str]) -> Iterator[str]:
+def _doubts(bag: Bag, assignment: TopicAssignment, world: World, topics: Mapping[str, str]) -> Iterator[str]:
     """What may be missing or wrong, a sentence each."""
     ids = {anchor.id for anchor in world.anchors}
-    named = dict(cast.ranges)
+    named = dict(assignment.ranges)
     for topic in bag.topics.values():
-        used = topic.name in cast.used
+        used = topic.name in assignment.used
         if used and topic.unreadable:
             yield f"{topic.unreadable} messages of {topic.name} cannot be decoded"
         if used and len(topic.samples) > 1 and len({sample.time_ns for _, sample in topic.samples}) == 1:

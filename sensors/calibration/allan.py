@@ -1,4 +1,4 @@
-"""Allan deviation of a sensor at rest: its noise, and how steady its bias is.
+"""Allan deviation of a sensor at rest: its noise, and the stability of its bias.
 
 Overlapping estimator of IEEE Std 952-1997, annex C (Riley 2008, section 5.2.4). White noise falls with the square root
 of the averaging time; where the curve is lowest, averaging longer helps no more.
@@ -23,7 +23,7 @@ LEAST_WINDOWS = 9
 
 
 class Allan(NamedTuple):
-    """The curve (n,): averaging times [s], deviations, and their own standard deviations, roughly; and what it says.
+    """The curve (n,): averaging times [s], deviations, and their own standard deviations, roughly; and its numbers.
 
     ``noise``: density of the white noise [unit s / sqrt(s)], for a gyro in rad/s: angle random walk [rad/sqrt(s)].
     ``bias_instability`` [unit]; ``is_lowest`` False: the curve still falls at its end, and it is less than this.
@@ -40,11 +40,11 @@ class Allan(NamedTuple):
 def allan_deviation(rates: Floats, sizes: Floats) -> Floats:
     """Overlapping Allan deviation of evenly spaced ``rates`` (n,), averaged over each of ``sizes`` samples (m,)."""
     sums = np.concatenate([[0.0], np.cumsum(rates)])
-    found = []
+    deviations = []
     for size in sizes.astype(int):
         means = (sums[size:] - sums[:-size]) / size
-        found.append(math.sqrt(0.5 * float(np.mean(np.square(means[size:] - means[:-size])))))
-    return np.array(found)
+        deviations.append(math.sqrt(0.5 * float(np.mean(np.square(means[size:] - means[:-size])))))
+    return np.array(deviations)
 
 
 def allan(rates: Floats, period_s: float) -> Allan | None:

@@ -1,4 +1,4 @@
-"""A differential drive that rolls along exact arcs: what a calibration makes of the wheels' counts.
+"""A differential drive that rolls along exact arcs: the motion model of an odometry calibration.
 
     d = (k_L l + k_R r) / 2        turn = (k_R r - k_L l) / b
 
@@ -19,7 +19,7 @@ from fusion.arrays import Floats
 from fusion.robot import Robot
 
 
-class Roll(NamedTuple):
+class WheelScales(NamedTuple):
     """True over measured roll of the left and the right side, and the effective track [m]."""
 
     left: float
@@ -27,13 +27,13 @@ class Roll(NamedTuple):
     track_m: float
 
     @classmethod
-    def of(cls, robot: Robot) -> Roll:
-        """What a world tells: its track is what turns by counts, so the distance's scale stretches it."""
+    def of(cls, robot: Robot) -> WheelScales:
+        """Scales of a world's robot: its track is in counted metres, so the scale of distances stretches it."""
         left, right = robot.side_scales
         scale = robot.distance_scale
         return cls(scale * left, scale * right, scale * robot.track_width_m)
 
-    def told(self, robot: Robot) -> Robot:
+    def applied_to(self, robot: Robot) -> Robot:
         """The robot with these numbers in it: `of` turned round. A constant share of every move is no part of them."""
         scale = 0.5 * (self.left + self.right)
         return dataclasses.replace(
@@ -45,15 +45,15 @@ class Roll(NamedTuple):
         )
 
 
-def turn_rad(roll: Roll, left_m: Floats, right_m: Floats) -> Floats:
+def turn_rad(scales: WheelScales, left_m: Floats, right_m: Floats) -> Floats:
     """Turn of each step [rad], left positive."""
-    return np.asarray((roll.right * right_m - roll.left * left_m) / roll.track_m)
+    return np.asarray((scales.right * right_m - scales.left * left_m) / scales.track_m)
 
 
-def arc_end(roll: Roll, left_m: Floats, right_m: Floats) -> Pose:
+def arc_end(scales: WheelScales, left_m: Floats, right_m: Floats) -> Pose:
     """Where the robot ends that begins at the origin, heading along x, after steps (n,) [m]; heading not wrapped."""
-    turns = turn_rad(roll, left_m, right_m)
-    chords = 0.5 * (roll.left * left_m + roll.right * right_m) * np.sinc(turns / (2.0 * np.pi))
+    turns = turn_rad(scales, left_m, right_m)
+    chords = 0.5 * (scales.left * left_m + scales.right * right_m) * np.sinc(turns / (2.0 * np.pi))
     ends = np.cumsum(turns)
     middles = ends - 0.5 * turns
     return Pose(float(chords @ np.cos(middles)), float(chords @ np.sin(middles)), float(ends[-1]) if len(ends) else 0.0)

@@ -1,4 +1,4 @@
-"""How alike neighbouring places are: an exponential correlation over the floor (Gudmundson 1991), found by REML."""
+"""Correlation of neighbouring places: exponential over the floor (Gudmundson 1991), estimated by REML."""
 
 from __future__ import annotations
 
@@ -7,28 +7,29 @@ import math
 import numpy as np
 
 from fusion.arrays import Floats, Whole
+from sensors.calibration.place_medians import PlaceMedians
 from sensors.calibration.readings_by_place import extent_m
-from sensors.calibration.spots import Spots
 
 LENGTHS, SHARES = 10, (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-"""How many correlation lengths, and which shares of uncorrelated variance, are tried."""
+"""Number of correlation lengths, and shares of uncorrelated variance, that are tried."""
 
 
-def blocks(told: Spots, length_m: float, share: float) -> list[tuple[Whole, Floats]]:
-    """Rows of each anchor and the correlation matrix of what is left of them; anchors know nothing of each other."""
-    found = []
-    for anchor in np.unique(told.anchor):
-        rows = np.flatnonzero(told.anchor == anchor)
-        away = np.hypot(np.subtract.outer(told.x[rows], told.x[rows]), np.subtract.outer(told.y[rows], told.y[rows]))
-        found.append((rows, (1.0 - share) * np.exp(-away / length_m) + share * np.eye(len(rows))))
-    return found
+def blocks(medians: PlaceMedians, length_m: float, share: float) -> list[tuple[Whole, Floats]]:
+    """Rows of each anchor and the correlation matrix of their residuals; anchors are independent."""
+    parts = []
+    for anchor in np.unique(medians.anchor):
+        rows = np.flatnonzero(medians.anchor == anchor)
+        x, y = medians.x[rows], medians.y[rows]
+        away = np.hypot(np.subtract.outer(x, x), np.subtract.outer(y, y))
+        parts.append((rows, (1.0 - share) * np.exp(-away / length_m) + share * np.eye(len(rows))))
+    return parts
 
 
-def find_correlation(told: Spots, design: Floats, left: Floats) -> tuple[float, float]:
+def find_correlation(medians: PlaceMedians, design: Floats, left: Floats) -> tuple[float, float]:
     """The likeliest length [m], up to as long as the floor, and share."""
-    extent = max(extent_m(told.x, told.y), 1e-3)
+    extent = max(extent_m(medians.x, medians.y), 1e-3)
     tried = [(float(length), share) for length in np.geomspace(0.02 * extent, extent, LENGTHS) for share in SHARES[:-1]]
-    return min([*tried, (extent, 1.0)], key=lambda pair: likelihood(blocks(told, *pair), design, left)[0])
+    return min([*tried, (extent, 1.0)], key=lambda pair: likelihood(blocks(medians, *pair), design, left)[0])
 
 
 def likelihood(parts: list[tuple[Whole, Floats]], design: Floats, left: Floats) -> tuple[float, float]:

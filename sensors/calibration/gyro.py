@@ -33,7 +33,7 @@ MARK_STD_RAD = math.radians(2.0)
 
 
 class Turn(NamedTuple):
-    """One turn: the truth's angle, the gyro's raw integral [rad], and how long it took [s]."""
+    """One turn: the truth's angle, the gyro's raw integral [rad], and its duration [s]."""
 
     true: float
     raw: float
@@ -41,7 +41,7 @@ class Turn(NamedTuple):
 
 
 class GyroCalibration(NamedTuple):
-    """Everything that was found. ``drift_rad_s``: standard deviation of the bias from one standstill to another, beyond
+    """Result of a calibration. ``drift_rad_s``: standard deviation of the bias from one standstill to another, beyond
     the noise. ``trend``: its change per hour [rad/s / h]; both None of too few standstills. ``scale`` None: no turns.
     """
 
@@ -61,16 +61,16 @@ def calibrate_gyro(runs: Sequence[Run], turns: float | None = None) -> GyroCalib
     """
     if turns is not None and (len(runs) != 1 or turns == 0.0 or not math.isfinite(turns)):
         raise ParameterError(f"--turns {turns}: give the turns of a single run, left positive and not zero")
-    told = [rates(run) for run in runs]
-    rolled = [wheels(run) for run in runs]
-    stops = still([stop for i, pair in enumerate(zip(told, rolled, strict=True)) for stop in standstills(*pair, i)])
+    gyros = [rates(run) for run in runs]
+    sides = [wheels(run) for run in runs]
+    stops = still([stop for i, pair in enumerate(zip(gyros, sides, strict=True)) for stop in standstills(*pair, i)])
     if not stops:
         raise LogError(
             f"{', '.join(str(run.path) for run in runs)}: no standstill of {LEAST_NS / NANOSECONDS:g} s or more; let "
             "the robot stand a minute before it drives"
         )
-    bias = estimate_bias(stops, told)
-    known = _marked(stops, told[0], turns) if turns is not None else _turns(runs, told, rolled)
+    bias = estimate_bias(stops, gyros)
+    known = _marked(stops, gyros[0], turns) if turns is not None else _turns(runs, gyros, sides)
     scale = _scale(known, bias, turns is not None)
     return GyroCalibration(
         bias=bias,
@@ -79,17 +79,17 @@ def calibrate_gyro(runs: Sequence[Run], turns: float | None = None) -> GyroCalib
         trend=_trend(stops),
         scale=scale,
         turns=known,
-        allan=_allan(stops, told),
+        allan=_allan(stops, gyros),
         scores=_scores(stops, known, runs[0].world.robot),
     )
 
 
-def estimate_bias(stops: Sequence[Standstill], told: Sequence[Rates]) -> Interval:
+def estimate_bias(stops: Sequence[Standstill], gyros: Sequence[Rates]) -> Interval:
     """The mean of the standstills, by Student's t over them; of one alone, over blocks of its samples."""
     if len(stops) > 1:
         biases = np.array([stop.bias for stop in stops])
         return Interval.of(float(biases.mean()), float(biases.std(ddof=1)) / math.sqrt(len(biases)), len(biases) - 1.0)
-    blocks = [float(block.mean()) for block in np.array_split(samples(stops[0], told)[1], BLOCKS)]
+    blocks = [float(block.mean()) for block in np.array_split(samples(stops[0], gyros)[1], BLOCKS)]
     return Interval.of(stops[0].bias, float(np.std(blocks, ddof=1)) / math.sqrt(BLOCKS), BLOCKS - 1.0)
 
 
@@ -108,29 +108,29 @@ def _trend(stops: Sequence[Standstill]) -> Interval | None:
     if len(stops) < 3 or len({stop.run for stop in stops}) > 1:
         return None
     hours = np.array([0.5 * (stop.from_ns + stop.until_ns) for stop in stops]) / NANOSECONDS / 3600.0
-    found = linregress(hours - hours[0], np.array([stop.bias for stop in stops]))
-    return Interval.of(float(found.slope), float(found.stderr), len(stops) - 2.0)
+    line = linregress(hours - hours[0], np.array([stop.bias for stop in stops]))
+    return Interval.of(float(line.slope), float(line.stderr), len(stops) - 2.0)
 
 
-def _turns(runs: Sequence[Run], told: Sequence[Rates], rolled: Sequence[Wheels]) -> list[Turn]:
+def _turns(runs: Sequence[Run], gyros: Sequence[Rates], sides: Sequence[Wheels]) -> list[Turn]:
     """Every piece of a run that turned enough, by a truth that has headings of its own."""
-    found = []
-    for i, (run, own, side) in enumerate(zip(runs, told, rolled, strict=True)):
+    pieces = []
+    for i, (run, own, side) in enumerate(zip(runs, gyros, sides, strict=True)):
         if run.truth is None or len(run.truth) < 2:
             continue
         for piece in find_segments(run, i, side):
             if abs(piece.turn_rad) >= LEAST_TURN_RAD and own.covers(piece.from_ns, piece.until_ns):
                 duration_s = (piece.until_ns - piece.from_ns) / NANOSECONDS
-                found.append(Turn(piece.turn_rad, own.turned(piece.from_ns, piece.until_ns), duration_s))
-    return found
+                pieces.append(Turn(piece.turn_rad, own.turned(piece.from_ns, piece.until_ns), duration_s))
+    return pieces
 
 
-def _marked(stops: Sequence[Standstill], told: Rates, turns: float) -> list[Turn]:
+def _marked(stops: Sequence[Standstill], gyro: Rates, turns: float) -> list[Turn]:
     """From the middle of the first standstill to the middle of the last."""
     begin, end = ((stop.from_ns + stop.until_ns) // 2 for stop in (stops[0], stops[-1]))
     if begin == end:
         raise LogError("--turns needs a standstill before the turns and one after them; let the robot stand a while")
-    return [Turn(math.tau * turns, told.turned(begin, end), (end - begin) / NANOSECONDS)]
+    return [Turn(math.tau * turns, gyro.turned(begin, end), (end - begin) / NANOSECONDS)]
 
 
 def _scale(turns: Sequence[Turn], bias: Interval, marked: bool) -> Interval | None:
@@ -153,10 +153,10 @@ def _scale(turns: Sequence[Turn], bias: Interval, marked: bool) -> Interval | No
     return Interval.of(scale, math.hypot(left / math.sqrt(weight), by_bias), min(freedom, 1e6))
 
 
-def _allan(stops: Sequence[Standstill], told: Sequence[Rates]) -> Allan | None:
+def _allan(stops: Sequence[Standstill], gyros: Sequence[Rates]) -> Allan | None:
     """Of the longest standstill, taken as evenly sampled."""
     longest = max(stops, key=lambda stop: stop.until_ns - stop.from_ns)
-    time_ns, rate = samples(longest, told)
+    time_ns, rate = samples(longest, gyros)
     return allan(rate, float(np.median(np.diff(time_ns))) / NANOSECONDS)
 
 

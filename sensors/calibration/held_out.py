@@ -1,4 +1,4 @@
-"""Before and after, told only of what was not fitted."""
+"""Errors before and after, of data that were not fitted."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def root_mean_square(errors: Floats) -> float:
 
 
 def sheet(title: str, scores: Sequence[BeforeAfter]) -> Sheet:
-    """As a table, with what is left of each error."""
+    """As a table, with the share of each error that is left."""
     rows = tuple(
         (f"{score.what}, {score.unit}", str(score.samples), f"{score.before:.4g}", f"{score.after:.4g}", _left(score))
         for score in scores
@@ -71,7 +71,7 @@ def _left(score: BeforeAfter) -> str:
 
 
 def record(value: object) -> object:
-    """Whatever a calibration holds, as strict JSON has it: named tuples by their names, what is not finite as None."""
+    """Content of a calibration as strict JSON: named tuples by their names, numbers that are not finite as None."""
     if isinstance(value, tuple) and hasattr(value, "_asdict"):
         return {key: record(item) for key, item in value._asdict().items()}
     if isinstance(value, dict):

@@ -1,8 +1,8 @@
-"""Where the next place should be: the distance at which one more reading tells most.
+"""The next places to measure: distances at which one more reading lowers the uncertainty most.
 
 Design of experiment (Fedorov 1972, chapter 3): of all distances the floor has, the one that lowers the variance of the
-prediction most, averaged over the distances that readings were taken at (the V criterion). A far place tells the slope,
-a near one the level; which of them is wanted depends on what is there.
+prediction most, averaged over the distances that readings were taken at (the V criterion). A far place determines the
+slope, a near one the level; the need for either depends on the readings there are.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ class Advice(NamedTuple):
 
 def pooled_covariance(line: Line) -> Floats:
     """Of (mean level, gain), (2, 2)."""
-    heard = len(line.covariance) - 1
-    pick = np.zeros((2, heard + 1))
-    pick[0, 1:], pick[1, 0] = 1.0 / heard, 1.0
+    anchors = len(line.covariance) - 1
+    pick = np.zeros((2, anchors + 1))
+    pick[0, 1:], pick[1, 0] = 1.0 / anchors, 1.0
     return np.asarray(pick @ line.covariance @ pick.T)
 
 
@@ -42,15 +42,15 @@ def next_places(world: World, kind: RadioKind, readings: Readings, line: Line, c
     candidates = _reachable(world)
     gain_at: Callable[[Floats], Floats] = world.anchors[0].model(kind).by_gain
     rows = np.column_stack([np.ones(CANDIDATES), gain_at(candidates)])
-    asked = np.column_stack([np.ones(len(readings.gain)), readings.gain])
-    weight, covariance, found = asked.T @ asked / len(asked), pooled_covariance(line), list[Advice]()
+    measured = np.column_stack([np.ones(len(readings.gain)), readings.gain])
+    weight, covariance, places = measured.T @ measured / len(measured), pooled_covariance(line), list[Advice]()
     for _ in range(count):
         moved = rows @ covariance
         novelty = line.place_std**2 + np.einsum("ij,ij->i", moved, rows)
         best = int(np.argmax(np.einsum("ij,jk,ik->i", moved, weight, moved) / novelty))
         covariance = covariance - np.outer(moved[best], moved[best]) / novelty[best]
-        found.append(Advice(float(candidates[best]), math.sqrt(float(covariance[1, 1]))))
-    return found
+        places.append(Advice(float(candidates[best]), math.sqrt(float(covariance[1, 1]))))
+    return places
 
 
 def _reachable(world: World) -> Floats:

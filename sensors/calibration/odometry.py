@@ -1,10 +1,10 @@
-"""What the wheels really roll: a scale for each side and the effective track, from pieces of known length or turn.
+"""Calibration of odometry: a scale for each side and the effective track, from pieces of known length or turn.
 
 Regularised least squares by Gauss and Newton, over the exact arcs of `arcs`. The residuals, measured minus modelled
 lengths and turns, stand over their standard deviations: the truth's, the noise of the world's odometry, and the
-encoders' resolution; three more hold both scales near one and the track near the nominal. How far lengths, turns and
-the drift of straight lines really scatter is estimated beside (variance components after Helmert; Koch 1999, section
-3.6), since nobody knows the floor beforehand. The covariance is (Jᵀ J)⁻¹ of the result.
+encoders' resolution; three more hold both scales near one and the track near the nominal. The variances of lengths, of
+turns and of the drift of straight lines are estimated beside (variance components after Helmert; Koch 1999, section
+3.6), since they depend on the floor. The covariance is (Jᵀ J)⁻¹ of the result.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from fusion import LogError, ParameterError
 from fusion.arrays import Flags, Floats, Whole
 from fusion.robot import Robot
 from logs.run import Run
-from sensors.calibration.arcs import Roll, arc_end, turn_rad
+from sensors.calibration.arcs import WheelScales, arc_end, turn_rad
 from sensors.calibration.held_out import BeforeAfter, Interval, root_mean_square
-from sensors.calibration.segments import STRAIGHT, find_segments, read_segments
+from sensors.calibration.segments import STRAIGHT, Segment, find_segments, read_segments
 from sensors.calibration.umbmark import Square, Umbmark, find_squares, judge
-from sensors.calibration.wheel_residuals import Rolled, Trend, linear_trend, rolled
+from sensors.calibration.wheel_residuals import LinearFit, MeasuredSegment, linear_trend, measured_segments
 from sensors.calibration.wheels import Wheels, nominal, wheels
 
 SCALE_STD, TRACK_STD = 0.1, 0.3
-"""How far a scale may be from one, and a track from the nominal, as a share of it: the priors."""
+"""Standard deviations of a scale from one, and of a track from the nominal, as a share of it: the priors."""
 ROUNDS = 5
 LEAST_SEGMENTS = 4
 GROUPS = ("lengths", "turns of straight pieces", "turns of all others")
@@ -38,12 +38,12 @@ LEAST_FREEDOM = 2.0
 """With fewer degrees a group's variance is taken as assumed."""
 
 
-class RollFit(NamedTuple):
-    """The estimate, the covariance of (left, right, track_m), degrees of freedom, and how far the rows of each of
-    `GROUPS` scatter about it, over what was assumed.
+class ScalesFit(NamedTuple):
+    """The estimate, the covariance of (left, right, track_m), degrees of freedom, and the scatter of each of `GROUPS`
+    about it, over the assumed one.
     """
 
-    roll: Roll
+    scales: WheelScales
     covariance: Floats
     freedom: float
     factors: tuple[float, ...]
@@ -54,112 +54,114 @@ class RollFit(NamedTuple):
         return Interval.of(value, math.sqrt(float(gradient @ self.covariance @ gradient)), self.freedom)
 
 
-def residuals(roll: Roll, told: Sequence[Rolled]) -> Floats:
+def residuals(scales: WheelScales, pieces: Sequence[MeasuredSegment]) -> Floats:
     """True minus modelled length [m] and turn [rad] of every segment, (2, n), NaN where not known."""
-    found = np.full((2, len(told)), np.nan)
-    for i, each in enumerate(told):
+    errors = np.full((2, len(pieces)), np.nan)
+    for i, each in enumerate(pieces):
         if math.isfinite(each.segment.distance_m):
-            found[0, i] = each.segment.distance_m - _length_m(roll, each)
+            errors[0, i] = each.segment.distance_m - _length_m(scales, each)
         if math.isfinite(each.segment.turn_rad):
-            found[1, i] = each.segment.turn_rad - float(turn_rad(roll, each.left, each.right).sum())
-    return found
+            errors[1, i] = each.segment.turn_rad - float(turn_rad(scales, each.left, each.right).sum())
+    return errors
 
 
-def _length_m(roll: Roll, told: Rolled) -> float:
+def _length_m(scales: WheelScales, piece: MeasuredSegment) -> float:
     """From a segment's beginning to its end. A straight one is a single arc: step by step, the wobble of whole ticks
     would shorten it.
     """
-    steps = (told.left, told.right)
-    left, right = [[side.sum()] for side in steps] if told.segment.kind == STRAIGHT else steps
-    end = arc_end(roll, np.asarray(left), np.asarray(right))
+    steps = (piece.left, piece.right)
+    left, right = [[side.sum()] for side in steps] if piece.segment.kind == STRAIGHT else steps
+    end = arc_end(scales, np.asarray(left), np.asarray(right))
     return math.hypot(end.x, end.y)
 
 
-def fit_roll(told: Sequence[Rolled], track_m: float, trend: Trend | None = None) -> RollFit:
-    """The roll that explains ``told`` best, from the paper's trend on; raises `LogError` where they are too few."""
-    check(told)
+def fit_scales(pieces: Sequence[MeasuredSegment], track_m: float, trend: LinearFit | None = None) -> ScalesFit:
+    """The scales that explain ``pieces`` best, starting at the paper's line; raises `LogError` for too few pieces."""
+    check(pieces)
     scale = trend.line.scale if trend is not None and trend.line.scale > 0.0 else 1.0
-    roll, factors, group = Roll(scale, scale, scale * track_m), np.ones(len(GROUPS)), _groups(told)
+    scales, factors, group = WheelScales(scale, scale, scale * track_m), np.ones(len(GROUPS)), _groups(pieces)
     for _ in range(ROUNDS):
-        roll, jacobian = _gauss_newton(roll, told, track_m, factors[group])
-        factors = _factors(roll, told, jacobian, group)
-    roll, jacobian = _gauss_newton(roll, told, track_m, factors[group])
+        scales, jacobian = _gauss_newton(scales, pieces, track_m, factors[group])
+        factors = _factors(scales, pieces, jacobian, group)
+    scales, jacobian = _gauss_newton(scales, pieces, track_m, factors[group])
     covariance: Floats = np.asarray(np.linalg.inv(jacobian.T @ jacobian), dtype=np.float64)
-    return RollFit(roll, covariance, max(len(jacobian) - 6.0, 1.0), tuple(map(float, factors)))
+    return ScalesFit(scales, covariance, max(len(jacobian) - 6.0, 1.0), tuple(map(float, factors)))
 
 
-def _groups(told: Sequence[Rolled]) -> Whole:
-    """Which of `GROUPS` the lengths and the turns belong to, (2, n)."""
-    straight = np.array([each.segment.kind == STRAIGHT for each in told])
-    return np.stack([np.zeros(len(told), dtype=np.int64), np.where(straight, 1, 2)])
+def _groups(pieces: Sequence[MeasuredSegment]) -> Whole:
+    """Indices into `GROUPS` of the lengths and the turns, (2, n)."""
+    straight = np.array([each.segment.kind == STRAIGHT for each in pieces])
+    return np.stack([np.zeros(len(pieces), dtype=np.int64), np.where(straight, 1, 2)])
 
 
-def check(told: Sequence[Rolled]) -> None:
-    """Refuse what cannot tell all three numbers."""
-    lengths = sum(math.isfinite(each.segment.distance_m) for each in told)
-    turns = [each.segment.turn_rad for each in told if abs(each.segment.turn_rad) > 0.5]
-    if len(told) < LEAST_SEGMENTS or not lengths or not turns:
+def check(pieces: Sequence[MeasuredSegment]) -> None:
+    """Refuse pieces that do not determine all three numbers; raises `LogError`."""
+    lengths = sum(math.isfinite(each.segment.distance_m) for each in pieces)
+    turns = [each.segment.turn_rad for each in pieces if abs(each.segment.turn_rad) > 0.5]
+    if len(pieces) < LEAST_SEGMENTS or not lengths or not turns:
         raise LogError(
             f"{lengths} pieces of known length and {len(turns)} turns are too few to calibrate the wheels; drive at "
             "least three straight lines and four spins, alternately left and right, or give them with --segments FILE"
         )
 
 
-def _gauss_newton(start: Roll, told: Sequence[Rolled], track_m: float, factors: Floats) -> tuple[Roll, Floats]:
+def _gauss_newton(
+    start: WheelScales, pieces: Sequence[MeasuredSegment], track_m: float, factors: Floats
+) -> tuple[WheelScales, Floats]:
     """The minimum and its Jacobian (m + 3, 3): a row for every known length, then turn, and three for the priors."""
     from scipy.optimize import least_squares
 
-    stds, known = _assumed(told) * factors, _known(told)
+    stds, known = _assumed(pieces) * factors, _known(pieces)
 
     def rows(numbers: Floats) -> Floats:
-        roll = Roll(*numbers)
-        whole = (residuals(roll, told) / stds)[known]
+        scales = WheelScales(*numbers)
+        whole = (residuals(scales, pieces) / stds)[known]
         priors = (
-            (1.0 - roll.left) / SCALE_STD,
-            (1.0 - roll.right) / SCALE_STD,
-            (1.0 - roll.track_m / track_m) / TRACK_STD,
+            (1.0 - scales.left) / SCALE_STD,
+            (1.0 - scales.right) / SCALE_STD,
+            (1.0 - scales.track_m / track_m) / TRACK_STD,
         )
         return np.concatenate([whole, priors])
 
-    found = least_squares(rows, np.array(start), jac="3-point", method="lm", x_scale=np.array(start))
-    return Roll(*map(float, found.x)), np.asarray(found.jac)
+    fit = least_squares(rows, np.array(start), jac="3-point", method="lm", x_scale=np.array(start))
+    return WheelScales(*map(float, fit.x)), np.asarray(fit.jac)
 
 
-def _factors(roll: Roll, told: Sequence[Rolled], jacobian: Floats, group: Whole) -> Floats:
-    """How much more each group scatters than assumed, by its own degrees of freedom: rows without leverage."""
+def _factors(scales: WheelScales, pieces: Sequence[MeasuredSegment], jacobian: Floats, group: Whole) -> Floats:
+    """Scatter of each group over the assumed one, by its own degrees of freedom: rows without leverage."""
     leverage = np.einsum("ij,jk,ik->i", jacobian, np.linalg.inv(jacobian.T @ jacobian), jacobian)[:-3]
-    known = _known(told)
-    squares, group = np.square(residuals(roll, told) / _assumed(told))[known], group[known]
+    known = _known(pieces)
+    squares, group = np.square(residuals(scales, pieces) / _assumed(pieces))[known], group[known]
     freedom = np.bincount(group, 1.0 - leverage, minlength=len(GROUPS))
     total = np.bincount(group, squares, minlength=len(GROUPS))
-    told_enough = freedom >= LEAST_FREEDOM
-    return np.where(told_enough, np.sqrt(np.maximum(total / np.where(told_enough, freedom, 1.0), 1e-12)), 1.0)
+    is_enough = freedom >= LEAST_FREEDOM
+    return np.where(is_enough, np.sqrt(np.maximum(total / np.where(is_enough, freedom, 1.0), 1e-12)), 1.0)
 
 
-def _assumed(told: Sequence[Rolled]) -> Floats:
+def _assumed(pieces: Sequence[MeasuredSegment]) -> Floats:
     """Standard deviations of lengths [m] and turns [rad], (2, n)."""
-    return np.array([(each.distance_std_m, each.turn_std_rad) for each in told]).T
+    return np.array([(each.distance_std_m, each.turn_std_rad) for each in pieces]).T
 
 
-def _known(told: Sequence[Rolled]) -> Flags:
-    """Which lengths and turns are known, (2, n)."""
-    return np.asarray(np.isfinite([(each.segment.distance_m, each.segment.turn_rad) for each in told])).T
+def _known(pieces: Sequence[MeasuredSegment]) -> Flags:
+    """True for the lengths and turns that are known, (2, n)."""
+    return np.asarray(np.isfinite([(each.segment.distance_m, each.segment.turn_rad) for each in pieces])).T
 
 
-def halves(told: Sequence[Rolled]) -> tuple[list[Rolled], list[Rolled]]:
+def halves(pieces: Sequence[MeasuredSegment]) -> tuple[list[MeasuredSegment], list[MeasuredSegment]]:
     """Two by two of each kind in turn, so that both halves hold straight lines, and turns in both senses."""
-    seen, found = Counter[str](), (list[Rolled](), list[Rolled]())
-    for each in told:
-        found[seen[each.segment.kind] // 2 % 2].append(each)
+    seen, parts = Counter[str](), (list[MeasuredSegment](), list[MeasuredSegment]())
+    for each in pieces:
+        parts[seen[each.segment.kind] // 2 % 2].append(each)
         seen[each.segment.kind] += 1
-    return found
+    return parts
 
 
-def score_held_out(told: Sequence[Rolled], before: Roll, track_m: float) -> list[BeforeAfter]:
+def score_held_out(pieces: Sequence[MeasuredSegment], before: WheelScales, track_m: float) -> list[BeforeAfter]:
     """Fitted on either half, judged on the other, both together. Empty where a half is too poor to be fitted."""
-    parts = halves(told)
+    parts = halves(pieces)
     try:
-        fits = [fit_roll(part, track_m, linear_trend(part)).roll for part in parts]
+        fits = [fit_scales(part, track_m, linear_trend(part)).scales for part in parts]
     except LogError:
         return []
     was = np.concatenate([residuals(before, part) for part in parts], axis=1)
@@ -177,12 +179,12 @@ def _finite(errors: Floats) -> Floats:
 
 
 class OdometryCalibration(NamedTuple):
-    """Everything that was found. ``umbmark``: before and after, the latter fitted without the squares it judges."""
+    """Result of a calibration. ``umbmark``: before and after, the latter fitted without the squares it judges."""
 
     robot: Robot
-    fit: RollFit
-    trend: Trend | None
-    told: Sequence[Rolled]
+    fit: ScalesFit
+    trend: LinearFit | None
+    pieces: Sequence[MeasuredSegment]
     scores: Sequence[BeforeAfter]
     umbmark: tuple[Umbmark, Umbmark] | None
     squares: int
@@ -190,15 +192,15 @@ class OdometryCalibration(NamedTuple):
 
     @property
     def numbers(self) -> dict[str, Interval]:
-        """What people ask for, each with its interval."""
-        roll, interval = self.fit.roll, self.fit.interval
-        ratio = roll.right / roll.left
+        """The numbers of interest, each with its interval."""
+        scales, interval = self.fit.scales, self.fit.interval
+        ratio = scales.right / scales.left
         return {
-            "left scale": interval((1.0, 0.0, 0.0), roll.left),
-            "right scale": interval((0.0, 1.0, 0.0), roll.right),
-            "mean scale": interval((0.5, 0.5, 0.0), 0.5 * (roll.left + roll.right)),
-            "right over left, E_d": interval((-ratio / roll.left, 1.0 / roll.left, 0.0), ratio),
-            "effective track, m": interval((0.0, 0.0, 1.0), roll.track_m),
+            "left scale": interval((1.0, 0.0, 0.0), scales.left),
+            "right scale": interval((0.0, 1.0, 0.0), scales.right),
+            "mean scale": interval((0.5, 0.5, 0.0), 0.5 * (scales.left + scales.right)),
+            "right over left, E_d": interval((-ratio / scales.left, 1.0 / scales.left, 0.0), ratio),
+            "effective track, m": interval((0.0, 0.0, 1.0), scales.track_m),
         }
 
 
@@ -209,44 +211,43 @@ def calibrate_odometry(runs: Sequence[Run], segments: Path | None = None) -> Odo
     """
     if segments is not None and len(runs) != 1:
         raise ParameterError(f"--segments {segments} measures one run, got {len(runs)}; calibrate that one alone")
-    robot, told_by = nominal(runs[0].world.robot), [wheels(run) for run in runs]
-    before = Roll.of(runs[0].world.robot)
-    found = [
-        find_segments(run, i, told) if segments is None else read_segments(segments, run, i)
-        for i, (run, told) in enumerate(zip(runs, told_by, strict=True))
+    robot, sides = nominal(runs[0].world.robot), [wheels(run) for run in runs]
+    before = WheelScales.of(runs[0].world.robot)
+    segments_of = [
+        find_segments(run, i, own) if segments is None else read_segments(segments, run, i)
+        for i, (run, own) in enumerate(zip(runs, sides, strict=True))
     ]
-    told = rolled([segment for own in found for segment in own], told_by, robot)
-    squares = [square for run, own in zip(runs, found, strict=True) for square in find_squares(run, own)]
-    trend = linear_trend(told)
+    pieces = measured_segments([segment for own in segments_of for segment in own], sides, robot)
+    squares = [square for run, own in zip(runs, segments_of, strict=True) for square in find_squares(run, own)]
+    trend = linear_trend(pieces)
     return OdometryCalibration(
         runs[0].world.robot,
-        fit_roll(told, robot.track_width_m, trend),
+        fit_scales(pieces, robot.track_width_m, trend),
         trend,
-        told,
-        score_held_out(told, before, robot.track_width_m),
-        _umbmark(told, squares, told_by, before, robot.track_width_m),
+        pieces,
+        score_held_out(pieces, before, robot.track_width_m),
+        _umbmark(pieces, squares, sides, before, robot.track_width_m),
         len(squares),
-        any(each.ready_made for each in told_by),
+        any(each.ready_made for each in sides),
     )
 
 
 def _umbmark(
-    told: Sequence[Rolled], squares: Sequence[Square], runs: Sequence[Wheels], before: Roll, track_m: float
+    pieces: Sequence[MeasuredSegment],
+    squares: Sequence[Square],
+    runs: Sequence[Wheels],
+    before: WheelScales,
+    track_m: float,
 ) -> tuple[Umbmark, Umbmark] | None:
     """Squares are judged by a fit to what lies outside them; None without squares in both senses, or the rest."""
-    outside = [
-        each
-        for each in told
-        if not any(
-            square.run == each.segment.run
-            and square.from_ns < each.segment.until_ns
-            and each.segment.from_ns < square.until_ns
-            for square in squares
-        )
-    ]
+    outside = [each for each in pieces if not any(_overlap(square, each.segment) for square in squares)]
     was = judge(before, squares, runs, track_m)
     try:
-        now = judge(fit_roll(outside, track_m, linear_trend(outside)).roll, squares, runs, track_m)
+        now = judge(fit_scales(outside, track_m, linear_trend(outside)).scales, squares, runs, track_m)
     except LogError:
         return None
     return None if was is None or now is None else (was, now)
+
+
+def _overlap(square: Square, segment: Segment) -> bool:
+    return square.run == segment.run and square.from_ns < segment.until_ns and segment.from_ns < square.until_ns

@@ -1,4 +1,4 @@
-"""The runs that a calibration is made from, and what is told of them afterwards."""
+"""The runs that a calibration is made from, and their record in the calibrated world."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from logs.reader import read_run
 from logs.run import Run
 
 FIRST_DATE_S = 946_684_800
-"""Stamps before the year 2000 count from some start that nobody knows, not from 1970."""
+"""Stamps before the year 2000 count from an unknown start, not from 1970."""
 
 
 def load_runs(paths: Sequence[Path], world: Path | None = None) -> list[Run]:
@@ -26,8 +26,8 @@ def load_runs(paths: Sequence[Path], world: Path | None = None) -> list[Run]:
             raise LogError(f"{path}: no such file; give an MCAP log (`fusion simulate` makes one)")
     runs = [read_run(path) for path in paths]
     if world is not None:
-        told = World.load(world)
-        return [dataclasses.replace(run, world=told) for run in runs]
+        other = World.load(world)
+        return [dataclasses.replace(run, world=other) for run in runs]
     for run in runs[1:]:
         if (run.world.anchors, run.world.robot) != (runs[0].world.anchors, runs[0].world.robot):
             raise LogError(
@@ -38,7 +38,7 @@ def load_runs(paths: Sequence[Path], world: Path | None = None) -> list[Run]:
 
 
 def recorded(runs: Sequence[Run]) -> str:
-    """The date (UTC) of the newest measurement by the logs' own stamps; "unknown" where their clock tells none."""
+    """The date (UTC) of the newest measurement by the logs' own stamps; "unknown" where their clock has none."""
     newest_s = max(measurement.time_ns for run in runs for measurement in run.measurements) // NANOSECONDS
     if newest_s < FIRST_DATE_S:
         return "unknown"
@@ -46,7 +46,7 @@ def recorded(runs: Sequence[Run]) -> str:
 
 
 def provenance(runs: Sequence[Run], method: str, samples: int, residual_std: float) -> Calibration:
-    """Where the numbers come from; the same runs give the same record."""
+    """Provenance of the numbers; the same runs give the same record."""
     return Calibration(
         method=method,
         logs=tuple(run.path.name for run in runs),

@@ -1,6 +1,6 @@
 """Radio readings with the distance they were taken at, gathered by places.
 
-Shadowing belongs to the place: a thousand readings in one spot know it no better than ten. Readings are therefore
+Shadowing belongs to the place: a thousand readings in one spot measure it no better than ten. Readings are therefore
 gathered into places, discs of the floor in the order of the first visit, and a place counts once for each anchor.
 """
 
@@ -30,11 +30,15 @@ PLACE_M, PLACES_ACROSS = 1.0, 16
 MOST_PLACES = 200
 
 
+COLUMNS = ("anchor", "value", "distance_m", "gain", "x", "y", "place")
+"""Those of `Readings`, one row for each reading."""
+
+
 class Readings(NamedTuple):
-    """Columns (n,) in the order of time: which of ``names`` was heard, its value [dBm or m], the distance between both
+    """Columns (n,) in the order of time: index into ``names``, its value [dBm or m], the distance between both
     antennas [m], the model's gain (`DistanceModel.by_gain`) there, where the robot was [m], and its place, from 0.
 
-    ``heard``: in which share of the scans that were taken at known places each anchor was heard.
+    ``received``: share of the scans at known places in which each anchor was received.
     """
 
     names: tuple[str, ...]
@@ -46,22 +50,11 @@ class Readings(NamedTuple):
     y: Floats
     place: Whole
     place_m: float
-    heard: dict[str, float]
+    received: dict[str, float]
 
     def at(self, rows: Flags) -> Readings:
         """Some of them."""
-        return Readings(
-            self.names,
-            self.anchor[rows],
-            self.value[rows],
-            self.distance_m[rows],
-            self.gain[rows],
-            self.x[rows],
-            self.y[rows],
-            self.place[rows],
-            self.place_m,
-            self.heard,
-        )
+        return self._replace(**{key: getattr(self, key)[rows] for key in COLUMNS})
 
 
 def gather(runs: Sequence[Run], kind: RadioKind, points: Path | None = None, place_m: float | None = None) -> Readings:
@@ -73,10 +66,10 @@ def gather(runs: Sequence[Run], kind: RadioKind, points: Path | None = None, pla
     names = tuple(anchor.id for anchor in world.anchors)
     rows, scans = list[tuple[int, float, float, float, float, float]](), 0
     for run in runs:
-        told = [m for m in run.measurements if isinstance(m, KINDS[kind])]
+        messages = [m for m in run.measurements if isinstance(m, KINDS[kind])]
         where = _surveyed(points, run) if points is not None else _truth(run)
-        scans += sum(where(np.array([scan.time_ns]))[1][0] for scan in told)
-        rows += _rows(world, kind, told, where)
+        scans += sum(where(np.array([scan.time_ns]))[1][0] for scan in messages)
+        rows += _rows(world, kind, messages, where)
     if not rows:
         raise LogError(
             f"{', '.join(str(run.path) for run in runs)}: no {kind} readings of the world's anchors at a known place; "
@@ -85,12 +78,12 @@ def gather(runs: Sequence[Run], kind: RadioKind, points: Path | None = None, pla
     anchor, value, distance, gain, x, y = (np.array(column) for column in zip(*rows, strict=True))
     place, radius = places(x, y, place_m)
     counts = np.bincount(anchor, minlength=len(names)) / max(scans, 1)
-    heard = {name: float(count) for name, count in zip(names, counts, strict=True)}
-    return Readings(names, anchor, value, distance, gain, x, y, place, radius, heard)
+    received = {name: float(count) for name, count in zip(names, counts, strict=True)}
+    return Readings(names, anchor, value, distance, gain, x, y, place, radius, received)
 
 
 class _Where:
-    """Where the robot is known to have been: poses at times, and whether each is known."""
+    """Known positions of the robot: poses at times, and whether each is known."""
 
     def __init__(self, known: Instants, spans: list[tuple[int, int]] | None = None) -> None:
         self._known, self._spans = known, spans
@@ -135,11 +128,11 @@ def _surveyed(path: Path, run: Run) -> _Where:
 
 
 def _rows(
-    world: World, kind: RadioKind, told: Sequence[WifiScan | Ranges], where: _Where
+    world: World, kind: RadioKind, messages: Sequence[WifiScan | Ranges], where: _Where
 ) -> Iterator[tuple[int, float, float, float, float, float]]:
     """Anchor, value, distance, gain, x and y of every finite reading of a known anchor at a known place."""
     index = {anchor.id: i for i, anchor in enumerate(world.anchors)}
-    readings = [(scan.time_ns, reading) for scan in told for reading in scan.readings if reading.anchor in index]
+    readings = [(scan.time_ns, reading) for scan in messages for reading in scan.readings if reading.anchor in index]
     taken = [time - reading.age_ns if isinstance(reading, RssiReading) else time for time, reading in readings]
     if not taken:
         return
@@ -179,12 +172,12 @@ def extent_m(x: Floats, y: Floats) -> float:
 
 
 def _leaders(x: Floats, y: Floats, radius_m: float) -> Whole:
-    centres, found = np.empty((2, 0)), np.empty(len(x), dtype=np.int64)
+    centres, place = np.empty((2, 0)), np.empty(len(x), dtype=np.int64)
     for i, here in enumerate(zip(x, y, strict=True)):
         away = np.hypot(centres[0] - here[0], centres[1] - here[1])
         near = np.flatnonzero(away <= radius_m)
         if len(near) == 0:
             centres = np.column_stack([centres, here])
             near = np.array([centres.shape[1] - 1])
-        found[i] = near[0]
-    return found
+        place[i] = near[0]
+    return place

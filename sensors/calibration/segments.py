@@ -1,7 +1,7 @@
-"""Pieces of a drive whose true length or turn is known: found in a log by its truth, or measured with a tape.
+"""Pieces of a drive whose true length or turn is known: segments in a log by its truth, or measured with a tape.
 
-Straight lines tell the wheels' scale, turns the effective track and, both senses together, which side is larger. The
-truth alone decides where a piece begins and ends; what the wheels said of it is what is judged.
+Straight lines determine the wheels' scale, turns the effective track and, both senses together, the larger side. The
+truth alone decides where a piece begins and ends; the wheels' measurement of it is judged.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ STRAIGHT_RADIUS_M = 2.5
 LEAST_S = 0.5
 LEAST_M = 0.25
 LEAST_RAD = 0.5
-"""Less says nothing beside the truth's own noise."""
+"""Less drowns in the truth's own noise."""
 STRAIGHT_RAD = 0.35
 """A piece that turns more altogether is an arc, however wide."""
 COURSE_M = 0.5
@@ -41,7 +41,7 @@ EXTEND_S = 0.4
 """A turn is taken this much longer at both ends, to where it is over: cut in full swing, it would be as wrong as the
 clocks of truth and sensor differ."""
 GAP_S = 1.5
-"""Where the truth is silent for longer, nobody knows what the robot did."""
+"""Where the truth is silent for longer, the motion of the robot is unknown."""
 STANDING, STRAIGHT, SPIN, ARC, TURN = "standing", "straight", "spin", "arc", "turn"
 """Kinds of motion; a turn is whatever was driven between two straight pieces."""
 
@@ -97,7 +97,7 @@ def _headings(truth: Instants) -> tuple[Whole, Floats]:
 
 
 def _kinds(truth: Instants, angles: tuple[Whole, Floats]) -> list[str]:
-    """What the robot does at each instant, by differences over `WINDOW_S` of its place and of ``angles`` in time."""
+    """Kind of motion at each instant, by differences over `WINDOW_S` of its place and of ``angles`` in time."""
     half = nanoseconds(0.5 * WINDOW_S)
     begins, ends = truth.time_ns - half, truth.time_ns + half
     moved = [np.interp(ends, truth.time_ns, c) - np.interp(begins, truth.time_ns, c) for c in (truth.x, truth.y)]
@@ -142,7 +142,7 @@ def _chord_m(truth: Instants, piece: Piece) -> float:
 
 
 def _with_heading(truth: Instants, number: int, piece: Piece) -> Segment:
-    """Lengths of straight pieces only: a spin goes nowhere, and the chord of an arc tells more of its turn. A heading
+    """Lengths of straight pieces only: a spin goes nowhere, and the chord of an arc depends on its turn. A heading
     that is missing at an end leaves the turn unknown, and missing for longer, what was driven.
     """
     heading, time_ns = truth.heading[piece.first : piece.last + 1], truth.time_ns[piece.first : piece.last + 1]
@@ -184,12 +184,12 @@ def read_segments(path: Path, run: Run, number: int) -> list[Segment]:
     distance_m (end from beginning) and turn_rad (whole turns counted, left positive), either of them may be empty.
     """
     start = begin_ns(run.measurements)
-    found = []
+    segments = []
     for row in read_table(path, ("from_s", "until_s", "distance_m", "turn_rad")):
         begin, end = start + row.time_ns("from_s"), start + row.time_ns("until_s")
-        told = [row.number(key) if row.text(key) else math.nan for key in ("distance_m", "turn_rad")]
-        if end <= begin or all(map(math.isnan, told)) or not all(math.isfinite(t) or math.isnan(t) for t in told):
+        distance, turn = (row.number(key) if row.text(key) else math.nan for key in ("distance_m", "turn_rad"))
+        if end <= begin or math.isinf(distance) or math.isinf(turn) or (math.isnan(distance) and math.isnan(turn)):
             raise LogError(f"{row.place}: give until_s after from_s, and a finite distance_m or turn_rad; correct it")
-        kind = SPIN if math.isnan(told[0]) else STRAIGHT if math.isnan(told[1]) or abs(told[1]) < LEAST_RAD else ARC
-        found.append(Segment(number, kind, begin, end, *told))
-    return found
+        kind = SPIN if math.isnan(distance) else STRAIGHT if math.isnan(turn) or abs(turn) < LEAST_RAD else ARC
+        segments.append(Segment(number, kind, begin, end, distance, turn))
+    return segments

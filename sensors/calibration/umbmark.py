@@ -1,4 +1,4 @@
-"""UMBmark: squares driven in both senses, and how far odometry ends from where the robot did.
+"""UMBmark: squares driven in both senses, and the distance from the end of odometry to that of the robot.
 
 The benchmark of Borenstein & Feng (1996, "Measurement and Correction of Systematic Odometry Errors in Mobile Robots"):
 the centres of gravity of the end offsets of either sense lie apart, since a wrong track and unequal wheels add up in
@@ -19,7 +19,7 @@ from fusion import Pose, wrap_angle
 from fusion.arrays import Floats
 from logs.run import Run
 from logs.truth import Instants, interpolate_truth, known_truth
-from sensors.calibration.arcs import Roll, arc_end
+from sensors.calibration.arcs import WheelScales, arc_end
 from sensors.calibration.segments import GAP_S, STRAIGHT, Segment
 from sensors.calibration.wheels import Wheels
 
@@ -84,14 +84,14 @@ def find_squares(run: Run, segments: Sequence[Segment]) -> list[Square]:
     sides = [
         each for each in segments if each.kind == STRAIGHT and each.from_ns >= first_ns and each.until_ns <= last_ns
     ]
-    found: list[Square] = []
+    squares: list[Square] = []
     i = 0
     while i + 4 <= len(sides):
         square = _square(truth, sides[i : i + 4])
         if square is not None:
-            found.append(square)
+            squares.append(square)
         i += 4 if square is not None else 1
-    return found
+    return squares
 
 
 def _square(truth: Instants, sides: Sequence[Segment]) -> Square | None:
@@ -115,20 +115,20 @@ def _square(truth: Instants, sides: Sequence[Segment]) -> Square | None:
     )
 
 
-def offsets(roll: Roll, squares: Sequence[Square], runs: Sequence[Wheels]) -> Floats:
+def offsets(scales: WheelScales, squares: Sequence[Square], runs: Sequence[Wheels]) -> Floats:
     """True minus calculated end of every square (n, 2) [m]."""
-    found = []
+    misses = []
     for square in squares:
-        moved = arc_end(roll, *runs[square.run].between(square.from_ns, square.until_ns))
+        moved = arc_end(scales, *runs[square.run].between(square.from_ns, square.until_ns))
         x, y = Pose(0.0, 0.0, square.heading).transform(moved.x, moved.y)
-        found.append((square.end[0] - x, square.end[1] - y))
-    return np.array(found, dtype=np.float64).reshape(-1, 2)
+        misses.append((square.end[0] - x, square.end[1] - y))
+    return np.array(misses, dtype=np.float64).reshape(-1, 2)
 
 
-def judge(roll: Roll, squares: Sequence[Square], runs: Sequence[Wheels], track_m: float) -> Umbmark | None:
+def judge(scales: WheelScales, squares: Sequence[Square], runs: Sequence[Wheels], track_m: float) -> Umbmark | None:
     """The benchmark of one calibration; None unless there are squares in both senses."""
     senses = np.array([square.sense for square in squares])
     if not ((senses > 0).any() and (senses < 0).any()):
         return None
-    ends, side = offsets(roll, squares, runs), float(np.mean([square.side_m for square in squares]))
+    ends, side = offsets(scales, squares, runs), float(np.mean([square.side_m for square in squares]))
     return umbmark(ends[senses < 0], ends[senses > 0], side, track_m)

@@ -1,4 +1,4 @@
-"""What the wheels told of each segment, how far that may scatter, and the paper's straight line through it."""
+"""Roll of the wheels over each segment, its standard deviations, and the paper's straight line through the lengths."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ TRUTH_STD_RAD = 0.02
 """Of the truth at either end of a piece, before its scatter is known."""
 
 
-class Rolled(NamedTuple):
-    """What the wheels told of one segment: steps of either side (n,) [m], and what its residuals should scatter by."""
+class MeasuredSegment(NamedTuple):
+    """Roll of both sides over one segment, step by step (n,) [m], and the standard deviations of its residuals."""
 
     segment: Segment
     left: Floats
@@ -30,7 +30,7 @@ class Rolled(NamedTuple):
     turn_std_rad: float
 
 
-class Trend(NamedTuple):
+class LinearFit(NamedTuple):
     """The paper's straight line, actual = scale * measured + offset, over whole straight moves (section II-B)."""
 
     line: LinearDistance
@@ -40,15 +40,15 @@ class Trend(NamedTuple):
     true_m: Floats
 
 
-def rolled(segments: Sequence[Segment], runs: Sequence[Wheels], robot: Robot) -> list[Rolled]:
+def measured_segments(segments: Sequence[Segment], runs: Sequence[Wheels], robot: Robot) -> list[MeasuredSegment]:
     """The wheels' side of every segment that they cover."""
-    found = []
+    measured = []
     for segment in segments:
-        told = runs[segment.run]
-        if told.covers(segment.from_ns, segment.until_ns):
-            left, right = told.between(segment.from_ns, segment.until_ns)
-            found.append(Rolled(segment, left, right, *_stds(robot, told.resolution_m, left, right)))
-    return found
+        wheels = runs[segment.run]
+        if wheels.covers(segment.from_ns, segment.until_ns):
+            left, right = wheels.between(segment.from_ns, segment.until_ns)
+            measured.append(MeasuredSegment(segment, left, right, *_stds(robot, wheels.resolution_m, left, right)))
+    return measured
 
 
 def _stds(robot: Robot, resolution_m: float, left: Floats, right: Floats) -> tuple[float, float]:
@@ -66,20 +66,20 @@ def _turn_variance(noise: OdometryNoise, path_m: float, turned_rad: float) -> fl
     return noise.turn_std_per_sqrt_m**2 * path_m + noise.turn_std_per_sqrt_rad**2 * turned_rad
 
 
-def linear_trend(told: Sequence[Rolled]) -> Trend | None:
+def linear_trend(pieces: Sequence[MeasuredSegment]) -> LinearFit | None:
     """The first step: least squares over the straight moves, None of fewer than three lengths."""
     from scipy.stats import linregress
 
-    straight = [each for each in told if each.segment.kind == STRAIGHT and each.segment.distance_m > 0.0]
+    straight = [each for each in pieces if each.segment.kind == STRAIGHT and each.segment.distance_m > 0.0]
     measured = np.array([abs(0.5 * float(each.left.sum() + each.right.sum())) for each in straight])
     true = np.array([each.segment.distance_m for each in straight])
     if len(straight) < 3 or np.ptp(measured) < 1e-9:
         return None
-    found, freedom = linregress(measured, true), len(straight) - 2
-    return Trend(
+    line, freedom = linregress(measured, true), len(straight) - 2
+    return LinearFit(
         LinearDistance.fit(measured.tolist(), true.tolist()),
-        Interval.of(float(found.slope), float(found.stderr), freedom),
-        Interval.of(float(found.intercept), float(found.intercept_stderr), freedom),
+        Interval.of(float(line.slope), float(line.stderr), freedom),
+        Interval.of(float(line.intercept), float(line.intercept_stderr), freedom),
         measured,
         true,
     )

@@ -1,4 +1,4 @@
-"""What the wheels rolled in a run, before any calibration: the columns that odometry is calibrated from."""
+"""Roll of the wheels in a run, before any calibration: the columns that odometry is calibrated from."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Wheels(NamedTuple):
     """Cumulative roll of the left and the right side [m] at ``time_ns``, all (n,), by the world's nominal wheels.
 
     ``lost`` counts the increments so far in which nothing measured the motion. ``resolution_m``: the least roll that
-    is told, 0 where the log holds ready-made increments. ``ready_made``: it holds no ticks, only such increments.
+    is measured, 0 where the log holds ready-made increments. ``ready_made``: it holds no ticks, only such increments.
     """
 
     time_ns: Whole
@@ -48,7 +48,7 @@ class Wheels(NamedTuple):
 
 
 def nominal(robot: Robot) -> Robot:
-    """The same robot as if nobody had calibrated it; its nominal track stays."""
+    """The same robot without any calibration; its nominal track stays."""
     return dataclasses.replace(
         robot, distance_scale=1.0, distance_offset_m=0.0, diameter_ratio=1.0, turn_source="wheels"
     )
@@ -62,8 +62,8 @@ def wheels(run: Run) -> Wheels:
     robot = nominal(run.world.robot)
     kinds = {type(measurement) for measurement in run.measurements}
     ready_made = WheelTicks not in kinds or not WHEELS[robot.drive]
-    told = (Odometry,) if ready_made else (WheelTicks, MotorCommand)
-    chosen = sorted((m for m in run.measurements if isinstance(m, told)), key=order)
+    sources = (Odometry,) if ready_made else (WheelTicks, MotorCommand)
+    chosen = sorted((m for m in run.measurements if isinstance(m, sources)), key=order)
     steps = _steps(robot, chosen)
     if not steps:
         raise LogError(f"{run.path}: holds no wheel ticks and no odometry; record a run with the wheels on")
@@ -79,13 +79,14 @@ def wheels(run: Run) -> Wheels:
     )
 
 
-def _steps(robot: Robot, told: list[Odometry | WheelTicks | MotorCommand]) -> list[Odometry]:
+def _steps(robot: Robot, measurements: list[Odometry | WheelTicks | MotorCommand]) -> list[Odometry]:
     """All increments in order of time, those that no time passes in left out."""
-    if not told:
+    if not measurements:
         return []
     odometer, steps = Odometer(robot), list[Odometry]()
-    state = odometer.start(told[0].time_ns if not isinstance(told[0], Odometry) else told[0].from_ns)
-    for measurement in told:
+    first = measurements[0]
+    state = odometer.start(first.from_ns if isinstance(first, Odometry) else first.time_ns)
+    for measurement in measurements:
         state, motion = odometer.advance(state, measurement)
         steps += [step for step in motion if isinstance(step, Odometry) and step.time_ns > step.from_ns]
     return steps

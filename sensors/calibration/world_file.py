@@ -65,7 +65,7 @@ def world_text(world: World, path: Path | None) -> str:
 
 
 def _without_none(table: Any) -> Any:  # noqa: ANN401 - whatever a table holds
-    """TOML has no word for nothing; a key that is left out says the same."""
+    """TOML has no word for nothing; a key that is left out means the same."""
     if isinstance(table, dict):
         return {key: _without_none(value) for key, value in table.items() if value is not None}
     return [_without_none(value) for value in table] if isinstance(table, list) else table

@@ -1,4 +1,4 @@
-"""``fusion calibrate``: which sensor is asked for stands beside the verb; without one of them, this says so."""
+"""``fusion calibrate``: the sensor stands beside the verb; without one, this explains it."""
 
 from __future__ import annotations
 

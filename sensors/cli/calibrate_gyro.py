@@ -18,80 +18,80 @@ from sensors.calibration.held_out import Interval, sheet
 from sensors.cli.calibration import Findings, calibrate, configure_common
 
 METHOD = (
-    "mean of standstills told by the wheels, scale by least squares through the origin, overlapping Allan deviation"
+    "mean of standstills shown by the wheels, scale by least squares through the origin, overlapping Allan deviation"
 )
 DEGREES = math.degrees(1.0)
 
 
 def findings(runs: Sequence[Run], turns: float | None = None) -> Findings:
     """The calibration as tables, sentences and changes of a world."""
-    found = calibrate_gyro(runs, turns)
+    calibration = calibrate_gyro(runs, turns)
     robot = runs[0].world.robot
-    sheets = [_sheet(found, robot)]
-    if found.scores:
-        sheets.append(sheet("Gyro where it was not calibrated", found.scores))
+    sheets = [_sheet(calibration, robot)]
+    if calibration.scores:
+        sheets.append(sheet("Gyro where it was not calibrated", calibration.scores))
     return Findings(
         name="gyro",
         method=METHOD,
-        samples=len(found.standstills),
-        residual_std=float(np.std([stop.bias for stop in found.standstills])),
+        samples=len(calibration.standstills),
+        residual_std=float(np.std([stop.bias for stop in calibration.standstills])),
         sheets=sheets,
-        remarks=_remarks(found, robot),
-        result=found._asdict(),
-        draw=partial(draw, found),
-        changes={"robot": _changes(found, robot)},
+        remarks=_remarks(calibration, robot),
+        result=calibration._asdict(),
+        draw=partial(draw, calibration),
+        changes={"robot": _changes(calibration, robot)},
         anchors={},
     )
 
 
-def _changes(found: GyroCalibration, robot: Robot) -> dict[str, object]:
+def _changes(calibration: GyroCalibration, robot: Robot) -> dict[str, object]:
     """The noise too, but only where the gyro gives the turn: else these keys speak of the wheels."""
-    changes: dict[str, object] = {"gyro_bias_rad_s": found.bias.value}
-    if found.scale is not None:
-        changes["gyro_scale"] = found.scale.value
+    changes: dict[str, object] = {"gyro_bias_rad_s": calibration.bias.value}
+    if calibration.scale is not None:
+        changes["gyro_scale"] = calibration.scale.value
     noise = {}
-    if found.allan is not None:
-        noise["turn_std_per_sqrt_s"] = found.allan.noise.value
-    if found.drift_rad_s is not None:
-        noise["turn_bias_std_rad_s"] = math.hypot(found.drift_rad_s, found.bias.std)
+    if calibration.allan is not None:
+        noise["turn_std_per_sqrt_s"] = calibration.allan.noise.value
+    if calibration.drift_rad_s is not None:
+        noise["turn_bias_std_rad_s"] = math.hypot(calibration.drift_rad_s, calibration.bias.std)
     return changes | ({"noise": noise} if robot.turn_source == "gyro" and noise else {})
 
 
-def _sheet(found: GyroCalibration, robot: Robot) -> Sheet:
-    rows = [("bias, °/s", f"{DEGREES * robot.gyro_bias_rad_s:.4f}", _degrees(found.bias).text(4))]
-    if found.drift_rad_s is not None:
-        rows.append(("its drift between standstills, °/s", "", f"{DEGREES * found.drift_rad_s:.4f}"))
-    if found.trend is not None:
-        rows.append(("its change, °/s an hour", "", _degrees(found.trend).text(2)))
-    if found.scale is not None:
-        rows.append(("scale, true over measured", f"{robot.gyro_scale:.4f}", found.scale.text(4)))
-    if found.allan is not None:
-        noise, lowest = _degrees(found.allan.noise), DEGREES * found.allan.bias_instability
+def _sheet(calibration: GyroCalibration, robot: Robot) -> Sheet:
+    rows = [("bias, °/s", f"{DEGREES * robot.gyro_bias_rad_s:.4f}", _degrees(calibration.bias).text(4))]
+    if calibration.drift_rad_s is not None:
+        rows.append(("its drift between standstills, °/s", "", f"{DEGREES * calibration.drift_rad_s:.4f}"))
+    if calibration.trend is not None:
+        rows.append(("its change, °/s an hour", "", _degrees(calibration.trend).text(2)))
+    if calibration.scale is not None:
+        rows.append(("scale, true over measured", f"{robot.gyro_scale:.4f}", calibration.scale.text(4)))
+    if calibration.allan is not None:
+        noise, lowest = _degrees(calibration.allan.noise), DEGREES * calibration.allan.bias_instability
         rows.append(("noise density, °/√s", f"{DEGREES * robot.noise.turn_std_per_sqrt_s:.4f}", noise.text(4)))
-        rows.append(("bias instability, °/s", "", f"{'' if found.allan.is_lowest else 'below '}{lowest:.4f}"))
-    title = f"Gyro, from {len(found.standstills)} standstills and {len(found.turns)} turns"
-    return Sheet(title, ("", "world", "found, 95 %"), tuple(rows))
+        rows.append(("bias instability, °/s", "", f"{'' if calibration.allan.is_lowest else 'below '}{lowest:.4f}"))
+    title = f"Gyro, from {len(calibration.standstills)} standstills and {len(calibration.turns)} turns"
+    return Sheet(title, ("", "world", "fit, 95 %"), tuple(rows))
 
 
 def _degrees(interval: Interval) -> Interval:
     return Interval(*(DEGREES * each for each in interval))
 
 
-def _remarks(found: GyroCalibration, robot: Robot) -> list[str]:
-    told = ["the log has no temperature: the bias holds for the warmth of this run"]
-    if len(found.standstills) == 1:
-        told.append("a single standstill: nothing says how the bias drifts; stop again, and at the end")
-    if found.scale is None:
-        told.append(
+def _remarks(calibration: GyroCalibration, robot: Robot) -> list[str]:
+    remarks = ["the log has no temperature: the bias holds for the warmth of this run"]
+    if len(calibration.standstills) == 1:
+        remarks.append("a single standstill: no measure of how the bias drifts; stop again, and at the end")
+    if calibration.scale is None:
+        remarks.append(
             "fewer than three turns with a true heading: no scale; turn ten times by a mark and give --turns 10"
         )
-    if found.allan is None or not found.allan.is_lowest:
-        told.append("the longest standstill is too short to see the bias wander; for its instability stand an hour")
+    if calibration.allan is None or not calibration.allan.is_lowest:
+        remarks.append("the longest standstill is too short to see the bias wander; for its instability stand an hour")
     if robot.turn_source != "gyro":
-        told.append(
+        remarks.append(
             f"the world takes the turn from its {robot.turn_source}: these numbers wait until turn_source = gyro"
         )
-    return told
+    return remarks
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -103,5 +103,5 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Calibrate and tell."""
+    """Calibrate and report."""
     return calibrate(arguments, partial(findings, turns=arguments.turns))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 
 from fusion.output.tables import Sheet
 from logs.run import Run
-from sensors.calibration.arcs import Roll
+from sensors.calibration.arcs import WheelScales
 from sensors.calibration.held_out import BeforeAfter, sheet
 from sensors.calibration.odometry import (
     OdometryCalibration,
@@ -27,78 +26,77 @@ METHOD = "regularised least squares over exact arcs (Gauss-Newton), variance com
 
 def findings(runs: Sequence[Run], segments: Path | None = None) -> Findings:
     """The calibration as tables, sentences and changes of a world."""
-    found = calibrate_odometry(runs, segments)
-    robot = found.fit.roll.told(found.robot)
+    calibration = calibrate_odometry(runs, segments)
+    robot = calibration.fit.scales.applied_to(calibration.robot)
     changes = {
         "distance_scale": robot.distance_scale,
         "distance_offset_m": robot.distance_offset_m,
         "diameter_ratio": robot.diameter_ratio,
         "track_width_m": robot.track_width_m,
     }
-    errors = residuals(found.fit.roll, found.told)[0]
+    pieces, scales, trend = calibration.pieces, calibration.fit.scales, calibration.trend
     return Findings(
         name="odometry",
         method=METHOD,
-        samples=len(found.told),
-        residual_std=float(np.nanstd(errors)),
-        sheets=_sheets(found),
-        remarks=_remarks(found),
+        samples=len(pieces),
+        residual_std=float(np.nanstd(residuals(scales, pieces)[0])),
+        sheets=_sheets(calibration),
+        remarks=_remarks(calibration),
         result={
-            "numbers": found.numbers,
-            "trend": None if found.trend is None else {"scale": found.trend.scale, "offset_m": found.trend.offset_m},
-            "held_out": found.scores,
-            "umbmark": found.umbmark,
-            "segments": [each.segment for each in found.told],
+            "numbers": calibration.numbers,
+            "trend": None if trend is None else {"scale": trend.scale, "offset_m": trend.offset_m},
+            "held_out": calibration.scores,
+            "umbmark": calibration.umbmark,
+            "segments": [each.segment for each in pieces],
         },
-        draw=partial(draw, found.trend, found.told, Roll.of(found.robot), found.fit.roll),
-        changes=None if found.ready_made else {"robot": changes},
+        draw=partial(draw, trend, pieces, WheelScales.of(calibration.robot), scales),
+        changes=None if calibration.ready_made else {"robot": changes},
         anchors={},
     )
 
 
-def _sheets(found: OdometryCalibration) -> list[Sheet]:
-    was = Roll.of(found.robot)
+def _sheets(calibration: OdometryCalibration) -> list[Sheet]:
+    was = WheelScales.of(calibration.robot)
     before = (was.left, was.right, 0.5 * (was.left + was.right), was.right / was.left, was.track_m)
-    rows = [
-        (name, f"{old:.4f}", number.text(4)) for (name, number), old in zip(found.numbers.items(), before, strict=True)
-    ]
-    if found.trend is not None:
+    numbers = zip(calibration.numbers.items(), before, strict=True)
+    rows = [(name, f"{old:.4f}", number.text(4)) for (name, number), old in numbers]
+    if calibration.trend is not None:
         rows += [
-            ("the paper's line: scale", "", found.trend.scale.text(4)),
-            ("the paper's line: offset, m", "", found.trend.offset_m.text(4)),
+            ("the paper's line: scale", "", calibration.trend.scale.text(4)),
+            ("the paper's line: offset, m", "", calibration.trend.offset_m.text(4)),
         ]
-    kinds = [each.segment.kind for each in found.told]
+    kinds = [each.segment.kind for each in calibration.pieces]
     counts = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
     sheets = [Sheet(f"Wheels, from {counts}", ("true over measured", "world", "fit, 95 %"), tuple(rows))]
-    if found.scores:
-        sheets.append(sheet("Odometry on the half that was not fitted", found.scores))
-    if found.umbmark is not None:
-        was_m, now_m = (each.e_max_m for each in found.umbmark)
-        score = BeforeAfter("UMBmark E_max,syst", "m", found.squares, was_m, now_m)
+    if calibration.scores:
+        sheets.append(sheet("Odometry on the half that was not fitted", calibration.scores))
+    if calibration.umbmark is not None:
+        was_m, now_m = (each.e_max_m for each in calibration.umbmark)
+        score = BeforeAfter("UMBmark E_max,syst", "m", calibration.squares, was_m, now_m)
         sheets.append(sheet("Squares, fitted without them", [score]))
     return sheets
 
 
-def _remarks(found: OdometryCalibration) -> list[str]:
-    told = []
-    if not found.scores:
-        told.append("too few pieces to hold half of them out: nothing says how good this is; record a longer run")
-    if found.trend is not None and not found.trend.offset_m.holds(0.0):
-        told.append(
-            f"the paper's line does not pass through zero, its offset is {found.trend.offset_m.text(3)} m: wheels that "
-            "slip at each start, or a truth that lags behind; the fit and the world have no such offset"
+def _remarks(calibration: OdometryCalibration) -> list[str]:
+    remarks = []
+    if not calibration.scores:
+        remarks.append("too few pieces to hold half of them out: no measure of how good this is; record a longer run")
+    if calibration.trend is not None and not calibration.trend.offset_m.holds(0.0):
+        remarks.append(
+            f"the paper's line does not pass through zero, its offset is {calibration.trend.offset_m.text(3)} m: "
+            "wheels that slip at each start, or a truth that lags behind; the fit and the world have no such offset"
         )
-    senses = {math.copysign(1.0, each.segment.turn_rad) for each in found.told if abs(each.segment.turn_rad) > 0.5}
-    if len(senses) == 1:
-        told.append("all turns go one way: unequal wheels and a wrong track look alike; turn the other way as often")
-    if found.ready_made:
-        told.append(
+    turns = [each.segment.turn_rad for each in calibration.pieces if abs(each.segment.turn_rad) > 0.5]
+    if turns and (min(turns) > 0.0 or max(turns) < 0.0):
+        remarks.append("all turns go one way: unequal wheels and a wrong track look alike; turn the other way as often")
+    if calibration.ready_made:
+        remarks.append(
             "the log holds ready-made increments and no ticks, which a world's wheels do not touch: correct the driver "
             "by these numbers"
         )
-    if found.squares and found.umbmark is None:
-        told.append("UMBmark needs squares in both senses, and lines and turns outside of them")
-    return told
+    if calibration.squares and calibration.umbmark is None:
+        remarks.append("UMBmark needs squares in both senses, and lines and turns outside of them")
+    return remarks
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -110,5 +108,5 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Calibrate and tell."""
+    """Calibrate and report."""
     return calibrate(arguments, partial(findings, segments=arguments.segments))

@@ -22,9 +22,9 @@ METHOD = "Huber's M-estimator over places, covariance by correlation over the fl
 GAINS: dict[RadioKind, str] = {"rssi": "path-loss exponent n", "range": "scale"}
 LEVELS: dict[RadioKind, str] = {"rssi": "RSSI at the reference distance, dBm", "range": "offset, m"}
 WIDE: dict[RadioKind, float] = {"rssi": 1.0, "range": 0.2}
-"""An interval of the gain that reaches further says nothing of use."""
+"""An interval of the gain that reaches further is of no use."""
 SELDOM = 0.95
-"""Heard in a smaller share of the scans, the weak readings that are missing bend the line."""
+"""Received in a smaller share of the scans, the weak readings that are missing bend the line."""
 
 
 def findings(runs: Sequence[Run], points: Path | None = None, place_m: float | None = None) -> Findings:
@@ -32,10 +32,10 @@ def findings(runs: Sequence[Run], points: Path | None = None, place_m: float | N
     if place_m is not None and not (math.isfinite(place_m) and place_m > 0.0):
         raise ParameterError(f"--place {place_m}: must be a radius in metres greater than zero")
     world = runs[0].world
-    found = [calibrate_radio(runs, kind, points, place_m) for kind in kinds_in(runs)]
+    calibrations = [calibrate_radio(runs, kind, points, place_m) for kind in kinds_in(runs)]
     pooled: dict[str, object] = {}
     single: dict[str, dict[str, object]] = {}
-    for each in found:
+    for each in calibrations:
         common, own = changes(world, each)
         pooled |= common
         for anchor, change in own.items():
@@ -43,96 +43,96 @@ def findings(runs: Sequence[Run], points: Path | None = None, place_m: float | N
     return Findings(
         name="radio",
         method=METHOD,
-        samples=sum(len(each.readings.value) for each in found),
-        residual_std=found[0].std,
-        sheets=[table for each in found for table in _sheets(world, each)],
-        remarks=[remark for each in found for remark in _remarks(each)],
-        result={each.kind: _result(each) for each in found},
-        draw=partial(draw, world, found),
+        samples=sum(len(each.readings.value) for each in calibrations),
+        residual_std=calibrations[0].std,
+        sheets=[table for each in calibrations for table in _sheets(world, each)],
+        remarks=[remark for each in calibrations for remark in _remarks(each)],
+        result={each.kind: _result(each) for each in calibrations},
+        draw=partial(draw, world, calibrations),
         changes=pooled,
         anchors=dict(single),
     )
 
 
-def _result(found: RadioCalibration) -> dict[str, object]:
-    line = found.line
+def _result(calibration: RadioCalibration) -> dict[str, object]:
+    line = calibration.line
     return {
         "gain": line.gain_interval(),
         "level": line.level_interval(),
         "level_std_between_anchors": line.level_std_between,
-        "std": found.std,
-        "std_in_place": found.spots.scatter,
+        "std": calibration.std,
+        "std_in_place": calibration.medians.scatter,
         "std_between_places": line.place_std,
         "correlation_length_m": line.length_m,
         "uncorrelated_share": line.share,
-        "readings": len(found.readings.value),
-        "places": int(found.readings.place.max()) + 1,
-        "place_m": found.readings.place_m,
-        "spots": line.spots,
-        "effective_spots": line.effective,
-        "anchors": found.anchors,
-        "held_out": found.scores,
-        "next_places": found.advice,
+        "readings": len(calibration.readings.value),
+        "places": int(calibration.readings.place.max()) + 1,
+        "place_m": calibration.readings.place_m,
+        "medians": line.medians,
+        "effective_medians": line.effective,
+        "anchors": calibration.anchors,
+        "held_out": calibration.scores,
+        "next_places": calibration.advice,
     }
 
 
-def _sheets(world: World, found: RadioCalibration) -> list[Sheet]:
-    readings, line, unit = found.readings, found.line, UNITS[found.kind]
+def _sheets(world: World, calibration: RadioCalibration) -> list[Sheet]:
+    readings, line, unit = calibration.readings, calibration.line, UNITS[calibration.kind]
     count = int(readings.place.max()) + 1
-    title = f"{found.kind}: {len(readings.value)} readings at {count} places of {readings.place_m:.2g} m"
+    title = f"{calibration.kind}: {len(readings.value)} readings at {count} places of {readings.place_m:.2g} m"
     rows = [
-        (GAINS[found.kind], line.gain_interval().text(3)),
-        (f"{LEVELS[found.kind]}, mean of the anchors", line.level_interval().text(3)),
+        (GAINS[calibration.kind], line.gain_interval().text(3)),
+        (f"{LEVELS[calibration.kind]}, mean of the anchors", line.level_interval().text(3)),
         (f"anchors' levels apart, {unit}", f"{line.level_std_between:.2f}"),
-        (f"σ of one reading, {unit}", f"{found.std:.2f}"),
-        (f"  of it within a place, {unit}", f"{found.spots.scatter:.2f}"),
+        (f"σ of one reading, {unit}", f"{calibration.std:.2f}"),
+        (f"  of it within a place, {unit}", f"{calibration.medians.scatter:.2f}"),
         (f"  of it between places, {unit}", f"{line.place_std:.2f}"),
         ("  which stays alike over, m", f"{line.length_m:.2f}"),
-        (f"spots of one anchor and place: {line.spots}, worth", f"{line.effective:.0f}"),
+        (f"medians of one anchor and place: {line.medians}, worth", f"{line.effective:.0f}"),
     ]
-    head = "anchor", "places", GAINS[found.kind], LEVELS[found.kind], f"σ places, {unit}", "heard %"
+    head = "anchor", "places", GAINS[calibration.kind], LEVELS[calibration.kind], f"σ places, {unit}", "received %"
     sheets = [
         Sheet(title, ("", "fit, 95 %"), tuple(rows)),
-        Sheet("Each anchor by itself", head, tuple(_anchor_rows(world, found))),
+        Sheet("Each anchor by itself", head, tuple(_anchor_rows(world, calibration))),
     ]
-    if found.scores:
-        sheets.append(sheet(f"{found.kind} at places that were not fitted", found.scores))
+    if calibration.scores:
+        sheets.append(sheet(f"{calibration.kind} at places that were not fitted", calibration.scores))
     return sheets
 
 
-def _anchor_rows(world: World, found: RadioCalibration) -> Iterator[tuple[str, ...]]:
+def _anchor_rows(world: World, calibration: RadioCalibration) -> Iterator[tuple[str, ...]]:
     for anchor in world.anchors:
-        fit = found.anchors[anchor.id]
+        fit = calibration.anchors[anchor.id]
         std = "–" if math.isnan(fit.place_std) else f"{fit.place_std:.2f}"
-        heard = f"{100.0 * fit.heard:.0f}" if found.kind == "rssi" else "–"
-        yield anchor.id, str(fit.places), _text(fit.gain), _text(fit.level), std, heard
+        received = f"{100.0 * fit.received:.0f}" if calibration.kind == "rssi" else "–"
+        yield anchor.id, str(fit.places), _text(fit.gain), _text(fit.level), std, received
 
 
 def _text(interval: Interval | None) -> str:
     return "–" if interval is None else interval.text(2)
 
 
-def _remarks(found: RadioCalibration) -> Iterator[str]:
-    gain = found.line.gain_interval()
-    if gain.reach > WIDE[found.kind]:
+def _remarks(calibration: RadioCalibration) -> Iterator[str]:
+    gain = calibration.line.gain_interval()
+    if gain.reach > WIDE[calibration.kind]:
         yield (
-            f"{found.kind}: {GAINS[found.kind]} and level can hardly be told apart, {gain.text(2)}: the readings are "
-            "too few, or at too equal distances"
+            f"{calibration.kind}: {GAINS[calibration.kind]} and level can hardly be separated, {gain.text(2)}: "
+            "the readings are too few, or at too equal distances"
         )
-    if found.kind == "rssi":
-        for name, share in found.readings.heard.items():
+    if calibration.kind == "rssi":
+        for name, share in calibration.readings.received.items():
             if share < SELDOM:
                 yield (
-                    f"rssi: {name} was heard in {100.0 * share:.0f} % of the scans; where only its strong readings are "
-                    "heard, n comes out too low"
+                    f"rssi: {name} was received in {100.0 * share:.0f} % of the scans; where only its strong readings "
+                    "are received, n comes out too low"
                 )
-    near = ", ".join(f"{each.distance_m:.1f} m" for each in found.advice)
+    near = ", ".join(f"{each.distance_m:.1f} m" for each in calibration.advice)
     yield (
-        f"{found.kind}: you need more places near d = {near}: they would bring the standard deviation of the "
-        f"{GAINS[found.kind]} from {gain.std:.2g} to {found.advice[-1].gain_std:.2g}"
+        f"{calibration.kind}: you need more places near d = {near}: they would bring the standard deviation of the "
+        f"{GAINS[calibration.kind]} from {gain.std:.2g} to {calibration.advice[-1].gain_std:.2g}"
     )
-    if not found.scores:
-        yield f"{found.kind}: too few places to leave some out: nothing says how good this is"
+    if not calibration.scores:
+        yield f"{calibration.kind}: too few places to leave some out: no measure of how good this is"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -150,5 +150,5 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Calibrate and tell."""
+    """Calibrate and report."""
     return calibrate(arguments, partial(findings, points=arguments.points, place_m=arguments.place))

@@ -1,4 +1,4 @@
-"""What the three verbs of `fusion calibrate` have in common on the command line."""
+"""Arguments and output that the three verbs of `fusion calibrate` have in common."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 
 class Findings(NamedTuple):
-    """What a calibration has to say: tables, sentences, a record for programs, a picture, and what of a world changes.
+    """Findings of a calibration: tables, sentences, a record for programs, a picture, and changes of a world.
 
-    ``remarks`` warn or ask for more; ``changes`` None: these logs cannot calibrate a world, and ``remarks`` say why.
+    ``remarks`` warn or ask for more; ``changes`` None: these logs cannot calibrate a world, for reasons in ``remarks``.
     """
 
     name: str
@@ -49,30 +49,31 @@ def configure_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--png", type=Path, metavar="OUT", help="draw the fit (needs the extra `plots`)")
 
 
-def calibrate(arguments: argparse.Namespace, find: Callable[[list[Run]], Findings]) -> int:
-    """Read, find, tell, write; what cannot be written is refused before any work."""
+def calibrate(arguments: argparse.Namespace, findings_of: Callable[[list[Run]], Findings]) -> int:
+    """Read, calibrate, report, write; what cannot be written is refused before any work."""
     if arguments.png is not None:
         require_matplotlib()
     for place in (arguments.output, arguments.json, arguments.png):
         if place is not None:
             require_place(place)
     runs = load_runs(arguments.runs, arguments.world)
-    found = find(runs)
-    for remark in (*(warning for run in runs for warning in run.warnings), *found.remarks):
-        sys.stderr.write(f"fusion calibrate {found.name}: {remark}\n")
-    about = provenance(runs, found.method, found.samples, found.residual_std)
+    findings = findings_of(runs)
+    for remark in (*(warning for run in runs for warning in run.warnings), *findings.remarks):
+        sys.stderr.write(f"fusion calibrate {findings.name}: {remark}\n")
+    about = provenance(runs, findings.method, findings.samples, findings.residual_std)
     if arguments.json != Path("-"):
-        print_sheets(found.sheets)
+        print_sheets(findings.sheets)
     if arguments.json is not None:
-        told = {"calibrates": found.name, "remarks": list(found.remarks), "changes": found.changes}
+        header = {"calibrates": findings.name, "remarks": list(findings.remarks), "changes": findings.changes}
         write_json(
-            arguments.json, record({**told, "anchors": found.anchors, "result": found.result, "about": asdict(about)})
+            arguments.json,
+            record({**header, "anchors": findings.anchors, "result": findings.result, "about": asdict(about)}),
         )
     if arguments.png is not None:
-        write(arguments.png, as_png(found.draw()))
+        write(arguments.png, as_png(findings.draw()))
     if arguments.output is not None:
-        if found.changes is None:
+        if findings.changes is None:
             raise LogError(f"{arguments.output}: not written, for these logs cannot calibrate a world; see above why")
         text = world_text(runs[0].world, arguments.world)
-        write_world(arguments.output, calibrated_text(text, found.changes, found.anchors, found.name, about))
+        write_world(arguments.output, calibrated_text(text, findings.changes, findings.anchors, findings.name, about))
     return 0

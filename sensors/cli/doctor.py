@@ -1,4 +1,4 @@
-"""`fusion doctor`: everything a recording needs, looked at before it begins, and the cure for each thing that is wrong.
+"""`fusion doctor`: examination of everything that a recording needs, with the cure for each thing that is wrong.
 
 It opens no device and changes nothing but one small file that it writes and removes.
 """
@@ -41,7 +41,7 @@ def examine(robot: RobotFile, folder: Path) -> list[Advice]:
 
 
 def _sensor(sensor: Sensor) -> Iterator[Advice]:
-    """The driver of one sensor, what it needs, its device, and what it says itself."""
+    """The driver of one sensor, its needs, its device, and its own advice."""
     try:
         driver = build_driver(sensor, BootClock())
     except FusionError as error:
@@ -59,8 +59,8 @@ def _direction(robot: RobotFile) -> Iterator[Advice]:
     for sensor in robot.sensors:
         with suppress(FusionError):
             kinds.update(build_driver(sensor, clock).spec.kinds)
-    if found := caution(robot.world.robot, kinds):
-        yield found
+    if advice := caution(robot.world.robot, kinds):
+        yield advice
 
 
 def _needs(name: str, needs: Needs) -> Iterator[Advice]:
@@ -82,15 +82,17 @@ def _needs(name: str, needs: Needs) -> Iterator[Advice]:
 
 
 def _devices(sensor: Sensor, driver: Driver) -> Iterator[Advice]:
-    found = ", ".join(f"{device.id} ({device.about})" for device in driver.discover())
+    devices = ", ".join(f"{device.id} ({device.about})" for device in driver.discover())
     cure = f"plug it in; docs/drivers.md names the page of {sensor.use}, with its wiring"
-    yield Advice(bool(found), f"{sensor.name}: {found or 'no such device is to be seen'}", cure)
+    yield Advice(bool(devices), f"{sensor.name}: {devices or 'no such device is present'}", cure)
 
 
 def _clock() -> Iterator[Advice]:
     synced = is_clock_synced()
     yield Advice(
-        synced, f"the wall clock is {'kept right' if synced else 'kept right by nobody'}", "timedatectl set-ntp true"
+        synced,
+        f"the wall clock is {'' if synced else 'not '}synchronised by {'a' if synced else 'any'} service",
+        "timedatectl set-ntp true",
     )
     has_clock = any(CLOCKS.glob("rtc*"))
     cure = "add a clock module; without one the date is wrong after a boot without network (stamps are not)"
@@ -143,23 +145,23 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Look and tell; 1 when something is not well."""
-    found = examine(RobotFile.load(arguments.robot), arguments.output)
+    """Examine and report; 1 when something needs attention."""
+    advices = examine(RobotFile.load(arguments.robot), arguments.output)
     if arguments.json:
-        sys.stdout.write(json.dumps([advice._asdict() for advice in found], indent=2) + "\n")
+        sys.stdout.write(json.dumps([advice._asdict() for advice in advices], indent=2) + "\n")
     else:
-        sys.stdout.write(_text(found))
-    return int(not all(advice.is_well for advice in found))
+        sys.stdout.write(_text(advices))
+    return int(not all(advice.is_well for advice in advices))
 
 
-def _text(found: Sequence[Advice]) -> str:
+def _text(advices: Sequence[Advice]) -> str:
     lines = []
-    for advice in found:
+    for advice in advices:
         lines.append(f"{'well' if advice.is_well else 'FIX '}  {advice.what}")
         if not advice.is_well and advice.cure:
             lines.append(f"      ↳ {advice.cure}")
-    ill = sum(not advice.is_well for advice in found)
+    ill = sum(not advice.is_well for advice in advices)
     lines.append(
-        f"{len(found) - ill} things are well, {ill} want a hand" if ill else f"all {len(found)} things are well"
+        f"{len(advices) - ill} things are well, {ill} need attention" if ill else f"all {len(advices)} things are well"
     )
     return "\n".join(lines) + "\n"

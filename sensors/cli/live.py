@@ -1,4 +1,4 @@
-"""`fusion live`: where the robot is, now, one line of JSON a pose."""
+"""`fusion live`: the live pose, one line of JSON each."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 from fusion import Estimate
 from fusion.cli.options import parse_options
 from sensors.cli.signals import stopped_by_signals
-from sensors.cli.status_line import StatusTeller, totals
+from sensors.cli.status_line import StatusLine, totals
 from sensors.onboard.live import Ended, Now, live
 from sensors.onboard.robot_file import RobotFile
 
@@ -34,11 +34,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--hz", type=float, default=10.0, help="poses a second (default 10)")
     parser.add_argument("--duration", metavar="S", type=float, help="stop after so many seconds")
     parser.add_argument("--degraded", action="store_true", help="begin without required sensors that are missing")
-    parser.add_argument("--json", action="store_true", help="tell the end as a last line of JSON, not on stderr")
+    parser.add_argument("--json", action="store_true", help="write the result as a last line of JSON, not on stderr")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Tell the pose until stopped; 0 when it was stopped and all went well, 1 when something ended by itself."""
+    """Write the pose until stopped; 0 when it was stopped and all went well, 1 when something ended by itself."""
     stop = threading.Event()
     poses = live(
         RobotFile.load(arguments.robot),
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
         degraded=arguments.degraded,
     )
     with stopped_by_signals(stop), closing(poses):
-        ended = _told(poses)
+        ended = _write_poses(poses)
     if arguments.json:
         _write_line({"ended": _ended(ended)})
     else:
@@ -64,9 +64,9 @@ def run(arguments: argparse.Namespace) -> int:
     return int(bool(ended.trouble))
 
 
-def _told(poses: Generator[Now, None, Ended]) -> Ended:
+def _write_poses(poses: Generator[Now, None, Ended]) -> Ended:
     """Write every pose: for programs on stdout, for people on stderr."""
-    teller = StatusTeller(over_itself=sys.stderr.isatty() and not sys.stdout.isatty())
+    line = StatusLine(over_itself=sys.stderr.isatty() and not sys.stdout.isatty())
     while True:
         try:
             now = next(poses)
@@ -76,7 +76,7 @@ def _told(poses: Generator[Now, None, Ended]) -> Ended:
         _write_line(record(now))
         for trouble in now.news:
             sys.stderr.write(f"\nfusion live: {trouble}\n")
-        teller.tell(now.statuses, describe(now), now.warning)
+        line.write(now.statuses, describe(now), now.warning)
 
 
 def _ended(ended: Ended) -> dict[str, object]:
@@ -104,7 +104,7 @@ def record(now: Now) -> dict[str, object]:
 
 
 def _pose(estimate: Estimate | None) -> dict[str, object]:
-    """What of the estimate may be used. A pose that is no number is not valid, whatever the estimator says of it."""
+    """The usable part of an estimate. A pose that is no number is not valid, whatever the estimator claims."""
     if estimate is None or not estimate.valid or not _finite(estimate.pose[:2]):
         unused = dict.fromkeys(("x", "y", "heading", "covariance", "ellipse"))
         return {"valid": False, "heading_known": False, "p_lost": _lost(estimate), **unused}
@@ -136,12 +136,12 @@ def describe(now: Now) -> str:
     """The pose in a few words."""
     if now.estimate is None:
         return "no pose: the estimator ended"
-    told = _pose(now.estimate)
-    if not told["valid"]:
+    usable = _pose(now.estimate)
+    if not usable["valid"]:
         return "no pose yet"
     x, y, heading = now.estimate.pose
     claim = now.estimate.covariance
-    spread = f" ± {claim.ellipse.major_std:.2f}" if claim and told["ellipse"] else ""
+    spread = f" ± {claim.ellipse.major_std:.2f}" if claim and usable["ellipse"] else ""
     return f"({x:.2f}, {y:.2f}){spread} m, " + (
-        f"{math.degrees(heading):.0f}°" if told["heading_known"] else "heading unknown"
+        f"{math.degrees(heading):.0f}°" if usable["heading_known"] else "heading unknown"
     )

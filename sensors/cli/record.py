@@ -1,4 +1,4 @@
-"""`fusion record`: the sensors of a robot into logs, until somebody says stop."""
+"""`fusion record`: the sensors of a robot into logs, until stopped."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import threading
 from pathlib import Path
 
 from sensors.cli.signals import stopped_by_signals
-from sensors.cli.status_line import StatusTeller, totals
+from sensors.cli.status_line import StatusLine, totals
 from sensors.onboard.recorder import Recorded, record
 from sensors.onboard.robot_file import RobotFile
 
@@ -24,13 +24,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fail-fast", action="store_true", help="stop at the first sensor that is lost")
     parser.add_argument("--min-free", metavar="MB", type=float, help="stop when less than this is free on the disk")
     parser.add_argument("--ring", action="store_true", help="give up the oldest files of this robot instead")
-    parser.add_argument("--json", action="store_true", help="tell the end as JSON")
+    parser.add_argument("--json", action="store_true", help="write the result as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Record; 0 when it was stopped, 1 when it ended by itself."""
     robot = _with_policy(RobotFile.load(arguments.robot), arguments)
-    stop, teller = threading.Event(), StatusTeller()
+    stop, line = threading.Event(), StatusLine()
     with stopped_by_signals(stop):
         recorded = record(
             robot,
@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
             duration_s=arguments.duration,
             degraded=arguments.degraded,
             fail_fast=arguments.fail_fast,
-            tell=lambda statuses, warning: teller.tell(statuses, warning=warning),
+            on_status=lambda statuses, warning: line.write(statuses, warning=warning),
         )
     sys.stderr.write("\n")
     sys.stdout.write(_json(recorded) if arguments.json else _text(recorded))
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _with_policy(robot: RobotFile, arguments: argparse.Namespace) -> RobotFile:
-    """What the command line says wins over the file."""
+    """The policy of the file, overridden by the command line."""
     given = {"ring": arguments.ring or None, "min_free_mb": arguments.min_free}
     changes = {key: value for key, value in given.items() if value is not None}
     return dataclasses.replace(robot, policy=dataclasses.replace(robot.policy, **changes))

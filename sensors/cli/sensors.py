@@ -1,4 +1,4 @@
-"""`fusion sensors`: which drivers are installed, and which devices of theirs are there now."""
+"""`fusion sensors`: the installed drivers, and the devices of each that are present."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from fusion.plugins import SENSORS
 
 
 def drivers() -> list[dict[str, Any]]:
-    """One entry per installed driver: name, summary, devices found; or name and error."""
+    """One entry per installed driver: name, summary, devices present; or name and error."""
     return [_entry(name) for name in names(SENSORS)]
 
 
 def _entry(name: str) -> dict[str, Any]:
     try:
         made = load(name, SENSORS)
-        found = [{**device._asdict(), "settings": dict(device.settings)} for device in made.discover()]
+        devices = [{**device._asdict(), "settings": dict(device.settings)} for device in made.discover()]
     except FusionError as error:
         return {"name": name, "error": str(error)}
     except Exception as error:  # noqa: BLE001 - a stranger's driver may lack or break anything
         return {"name": name, "error": f"it is no driver: {error!r}; try `fusion check --driver {name}`"}
-    return {"name": name, "summary": made.summary, "devices": found}
+    return {"name": name, "summary": made.summary, "devices": devices}
 
 
 def _text(entry: dict[str, Any]) -> str:

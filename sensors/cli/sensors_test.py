@@ -1,7 +1,7 @@
-"""`fusion sensors test`: every sensor of a robot run for a while, and a report of what was seen, to be attached.
+"""`fusion sensors test`: every sensor of a robot run for a while, and a report of it, to be attached.
 
-What only a person with the hardware can prove is proved by such a report: device, firmware, rates, the spread of the
-intervals, the diagnostics, and on which computer.
+Such a report proves what needs the hardware: device, firmware, rates, the spread of the intervals, the diagnostics, and
+the computer it ran on.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 from fusion import BootClock, Diagnostic, DriverError, FusionError, __version__
 from fusion.values import seconds
 from sensors.onboard.computer import clock_sync
-from sensors.onboard.driver_lifecycle import Keeper, Received, State
+from sensors.onboard.driver_lifecycle import DriverLifecycle, Received, State
 from sensors.onboard.robot_file import RobotFile, build_driver
 from sensors.onboard.supervisor import HUNG_S
 
@@ -38,21 +38,21 @@ def self_test(robot: RobotFile, duration_s: float = SECONDS) -> dict[str, Any]:
     rows: dict[str, dict[str, Any]] = {}
     began = clock_sync()
 
-    def watch(name: str, keeper: Keeper) -> None:
-        heard: list[Received] = []
+    def watch(name: str, lifecycle: DriverLifecycle) -> None:
+        outputs: list[Received] = []
         while seconds(clock.now_ns() - began.boot_ns) < duration_s:
-            heard += keeper.turn(0.1)
-        rows[name] = _row(keeper, heard)
-        keeper.close()
+            outputs += lifecycle.step(0.1)
+        rows[name] = _row(lifecycle, outputs)
+        lifecycle.close()
 
     threads = []
     for sensor in robot.sensors:
         try:
-            keeper = Keeper(sensor.name, build_driver(sensor, clock), clock)
+            lifecycle = DriverLifecycle(sensor.name, build_driver(sensor, clock), clock)
         except DriverError as error:
             rows[sensor.name] = {"state": State.FAILED.value, "error": str(error)}
             continue
-        threads.append(threading.Thread(target=watch, args=(sensor.name, keeper), daemon=True))
+        threads.append(threading.Thread(target=watch, args=(sensor.name, lifecycle), daemon=True))
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -63,26 +63,27 @@ def self_test(robot: RobotFile, duration_s: float = SECONDS) -> dict[str, Any]:
     return {**_computer(), "duration_s": duration_s, "clocks": began._asdict(), "sensors": sensors}
 
 
-def _row(keeper: Keeper, heard: Sequence[Received]) -> dict[str, Any]:
-    """What one sensor said: its rate, the spread of its intervals, how old its messages were when they came."""
-    diagnostics = [one.said for one in heard if isinstance(one.said, Diagnostic)]
-    said = [one for one in heard if not isinstance(one.said, Diagnostic)]
-    intervals = [seconds(later.said.time_ns - earlier.said.time_ns) for earlier, later in pairwise(said)]
-    ages = [seconds(one.received_ns - one.said.time_ns) for one in said]
+def _row(lifecycle: DriverLifecycle, outputs: Sequence[Received]) -> dict[str, Any]:
+    """Results of one sensor: its rate, the spread of its intervals, the ages of its messages at arrival."""
+    diagnostics = [one.output for one in outputs if isinstance(one.output, Diagnostic)]
+    measured = [one for one in outputs if not isinstance(one.output, Diagnostic)]
+    intervals = [seconds(later.output.time_ns - earlier.output.time_ns) for earlier, later in pairwise(measured)]
+    ages = [seconds(one.received_ns - one.output.time_ns) for one in measured]
+    info = lifecycle.info
     return {
-        "state": keeper.state.value,
-        "error": str(keeper.error or ""),
-        "device": None if keeper.info is None else {**keeper.info._asdict(), "settings": dict(keeper.info.settings)},
-        "nominal_hz": keeper.driver.spec.nominal_hz,
-        "messages": len(said),
+        "state": lifecycle.state.value,
+        "error": str(lifecycle.error or ""),
+        "device": info and {**info._asdict(), "settings": dict(info.settings)},
+        "nominal_hz": lifecycle.driver.spec.nominal_hz,
+        "messages": len(measured),
         "rate_hz": len(intervals) / sum(intervals) if sum(intervals) > 0.0 else None,
         "interval_s": _spread(intervals),
         "age_s": _spread(ages),
-        "losses": keeper.losses,
+        "losses": lifecycle.losses,
         "diagnostics": Counter(f"{diagnostic.level.name} {diagnostic.text}" for diagnostic in diagnostics).most_common(
             LAST_DIAGNOSTICS
         ),
-        "last": [repr(one.said) for one in said[-2:]],
+        "last": [repr(one.output) for one in measured[-2:]],
     }
 
 
@@ -114,7 +115,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Test and tell; 1 when a sensor said nothing, or was not running at the end."""
+    """Test and report; 1 when a sensor was silent, or was not running at the end."""
     report = self_test(RobotFile.load(arguments.robot), arguments.seconds)
     text = json.dumps(report, indent=2, default=str) + "\n"
     if arguments.output is not None:

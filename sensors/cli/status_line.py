@@ -1,4 +1,4 @@
-"""How all sensors do, for people, in one line."""
+"""The status of all sensors, for people, in one line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sensors.onboard.supervisor import Status
 
 
 def status_line(statuses: Sequence[Status]) -> str:
-    """How all sensors do, in one line.
+    """Status of all sensors in one line.
 
     >>> status_line([Status("gyro", State.RUNNING, 99.96, 0.01, 400, 0, 0, ""),
     ...              Status("wifi", State.BACKOFF, None, 4.2, 12, 3, 1, "wlan0 is down")])
@@ -27,11 +27,11 @@ def status_line(statuses: Sequence[Status]) -> str:
 
 
 def totals(statuses: Sequence[Status]) -> list[str]:
-    """What came of each sensor, a line each."""
+    """Counts of each sensor, a line each."""
     return [f"{s.name}: {s.messages} messages, {s.dropped} dropped, lost {s.losses} times" for s in statuses]
 
 
-class StatusTeller:
+class StatusLine:
     """Writes the status line to stderr: over itself on a terminal, once a change of state elsewhere."""
 
     def __init__(self, *, over_itself: bool | None = None) -> None:
@@ -39,8 +39,8 @@ class StatusTeller:
         self._last: list[State] = []
         self._is_warned = False
 
-    def tell(self, statuses: Sequence[Status], first: str = "", warning: str = "") -> None:
-        """Write how sensors do, after something else that belongs ``first``; a ``warning`` once, on its own line."""
+    def write(self, statuses: Sequence[Status], first: str = "", warning: str = "") -> None:
+        """Write the status of sensors, after a text that belongs ``first``; a ``warning`` once, on its own line."""
         if warning and not self._is_warned:
             sys.stderr.write(f"\nwarning: {warning}\n")
             self._is_warned = True

@@ -17,7 +17,7 @@ from fusion import BootClock, Clock, DeviceLostError, DriverError, Found, Needs,
 from sensors.device_errors import device_error
 from sensors.gyro.sampling import AXES, Sample, SampledGyro, UnreadableError, Vector
 
-CURE = "load its driver: docs/drivers-gyro.md tells how"
+CURE = "load its driver: see docs/drivers-gyro.md"
 SYSFS = "/sys/bus/iio/devices"
 CLOCK_FILE = "current_timestamp_clock"
 MONOTONIC = "monotonic"
@@ -96,7 +96,7 @@ class GyroIio(SampledGyro):
                 f"{self._name}: {folder.name} went away ({error})", "load its driver again"
             ) from error
         except ValueError as error:
-            raise UnreadableError(f"{folder.name} says what is no number: {error}") from error
+            raise UnreadableError(f"{folder.name} holds no number: {error}") from error
 
     def _read_axes(self, folder: Path, kind: str, scale: float = 1.0) -> Vector:
         """Three axes; a chip that lacks some has zero there."""
@@ -124,7 +124,7 @@ def _text(file: Path) -> str:
 
 
 def _temperature(folder: Path) -> float | None:
-    """In °C; the files tell thousandths."""
+    """In °C; the files hold thousandths."""
     raw, offset, scale = (_text(folder / file) for file in TEMPERATURES)
     return (float(raw) + float(offset or 0.0)) * float(scale or 1.0) / 1000.0 if raw else None
 

@@ -38,7 +38,7 @@ WHO_AM_I, POWER, RATE_DIVIDER, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, FIRST_SAMPLE =
     0x3B,
 )
 MODELS = {0x68: "MPU-6050", 0x70: "MPU-6500", 0x71: "MPU-9250"}
-"""What WHO_AM_I says, as far as the registers used here are the same."""
+"""Models by WHO_AM_I of which the registers used here are the same."""
 RANGES_DEG_S = (250, 500, 1000, 2000)
 """Full scales of the gyro, by FS_SEL; 131 steps to the degree a second at the first, half as many at each next."""
 LOW_PASS_44_HZ = 3
@@ -67,7 +67,7 @@ class Bus(Protocol):
 
 
 def parse(block: bytes, full_scale_deg_s: int) -> Sample:
-    """A sample from its fourteen bytes; raises `UnreadableError` for what a bus says that dropped out.
+    """A sample from its fourteen bytes; raises `UnreadableError` for the bytes of a bus that dropped out.
 
     >>> parse(bytes.fromhex("0000 0000 4000 0000 0000 0000 0083"), 250)
     Sample(rate_rad_s=(0.0, 0.0, 0.017453292519943295), acceleration_m_s2=(0.0, 0.0, 9.80665), temperature_c=36.53)
@@ -113,8 +113,8 @@ class GyroMpu6050(SampledGyro):
         """``device`` stands in for the bus."""
         super().__init__(name, clock, axis=axis, hz=hz)
         if full_scale_deg_s not in RANGES_DEG_S:
-            told = ", ".join(map(str, RANGES_DEG_S))
-            raise SettingError(f"{name}: full_scale_deg_s = {full_scale_deg_s}", f"give one of {told}")
+            scales = ", ".join(map(str, RANGES_DEG_S))
+            raise SettingError(f"{name}: full_scale_deg_s = {full_scale_deg_s}", f"give one of {scales}")
         self._number, self._address, self._scale = bus, address, full_scale_deg_s
         self._open_device = device
         self._bus: Bus | None = None
@@ -197,7 +197,7 @@ class FakeMpu6050:
         self.clock = BootClock()
         self.settings = {"device": lambda _number: self, "hz": 50.0}
         self.block = bytes.fromhex("0000 0000 4000 0000 0000 0000 0083")
-        """What the sample registers hold: one degree a second about z."""
+        """Content of the sample registers: one degree a second about z."""
         self._registers = {WHO_AM_I: 0x68}
         self._is_there = True
         self._garbled = 0

@@ -1,6 +1,6 @@
-"""What gyros that are asked for each sample have in common: a pace, an axis, a stamp in the middle of the reading.
+"""Base of the drivers for gyros that are polled: a pace, an axis, a stamp in the middle of the reading.
 
-Samples are due at whole periods from the opening on. A program that is held up skips what it missed and says how many,
+Samples are due at whole periods from the opening on. A program that is held up skips and counts what it missed,
 instead of reading the past in a hurry. The bias is never taken off: `sensors.onboard.gyro_bias` measures it.
 """
 
@@ -14,7 +14,7 @@ from fusion.values import Gyro, nanoseconds, seconds
 
 AXES = {"x": 0, "y": 1, "z": 2}
 TEMPERATURE_S = 10.0
-"""How often the temperature is told: it changes slowly, and the bias with it."""
+"""Period of the temperature reports: it changes slowly, and the bias with it."""
 Vector = tuple[float, float, float]
 
 
@@ -33,7 +33,7 @@ class UnreadableError(Exception):
 
 
 class SampledGyro:
-    """A gyro that is asked for its samples; one of the drivers that derive from this is meant.
+    """A gyro that is asked for its samples; base of a driver for each chip.
 
     ``axis`` is the chip's axis that points up, as ``+z`` or ``-x``: a left turn comes out positive.
     """
@@ -83,7 +83,7 @@ class SampledGyro:
             sample = self._read()
         except UnreadableError as error:
             return [self._diagnostic(began_ns, Level.WARN, str(error))]
-        return list(self._said(sample, (began_ns + self._clock.now_ns()) // 2))
+        return list(self._outputs(sample, (began_ns + self._clock.now_ns()) // 2))
 
     def close(self) -> None:
         """Let go of the chip."""
@@ -102,7 +102,7 @@ class SampledGyro:
         """One sample; raises `UnreadableError` or a `DriverError`."""
         raise NotImplementedError
 
-    def _said(self, sample: Sample, time_ns: int) -> Iterator[DriverOutput]:
+    def _outputs(self, sample: Sample, time_ns: int) -> Iterator[DriverOutput]:
         self._seq += 1
         rate = self._sign * sample.rate_rad_s[self._axis]
         yield Gyro(time_ns, self._name, self._seq, rate, sample.acceleration_m_s2)

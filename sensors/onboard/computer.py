@@ -14,23 +14,23 @@ from logs.device_messages import ClockSync
 
 BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 NOT_SYNCHRONISED = 5
-"""TIME_ERROR, what adjtimex(2) answers while nothing keeps the clock right."""
+"""TIME_ERROR, the answer of adjtimex(2) while no service disciplines the clock."""
 TIMEX_BYTES = 512
 """More than a struct timex takes on any machine; all zero it only asks."""
 
 
 def clock_sync() -> ClockSync:
-    """The clocks as they stand now."""
+    """The clocks at this moment."""
     boot_ns, monotonic_ns = time.clock_gettime_ns(time.CLOCK_BOOTTIME), time.monotonic_ns()
     return ClockSync(boot_ns, monotonic_ns, time.time_ns(), is_clock_synced())
 
 
 def is_clock_synced() -> bool:
-    """Whether something (NTP, PTP, GPS) keeps the wall clock right, as the kernel has it."""
+    """Whether a service (NTP, PTP, GPS) keeps the wall clock synchronised, by the state of the kernel."""
     try:
         return ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(TIMEX_BYTES)) not in (-1, NOT_SYNCHRONISED)
     except (AttributeError, OSError):
-        return False  # no such call on this system: nobody vouches for the clock
+        return False  # no such call on this system: not known to be
 
 
 def boot_id() -> str:
@@ -42,11 +42,11 @@ def boot_id() -> str:
 
 
 def free_bytes(folder: Path) -> int:
-    """What a plain user may still write where ``folder`` is."""
+    """Bytes that a plain user may still write where ``folder`` is."""
     return shutil.disk_usage(folder).free
 
 
-def tell_service_manager(message: str) -> None:
+def notify_service_manager(message: str) -> None:
     """Send ``READY=1``, ``WATCHDOG=1`` or ``STOPPING=1`` to systemd, where it started us (sd_notify(3))."""
     address = os.environ.get("NOTIFY_SOCKET", "")
     if not address:

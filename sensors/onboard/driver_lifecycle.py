@@ -1,9 +1,9 @@
-"""Keeps one driver going: opens it, watches it, lets go of it when it falls silent or is lost, and tries again.
+"""Lifecycle of one driver: open it, poll it, close it when it falls silent or is lost, and try again.
 
     CLOSED → OPENING → RUNNING → STALLED → BACKOFF → OPENING …        FAILED: a person is needed
 
 A device that is not there at the start takes the same path as one that is lost on the way. There is one diagnostic for
-the loss of a sensor and one for its return, however many tries lie between. There is no thread here: `turn` does one
+the loss of a sensor and one for its return, however many tries lie between. There is no thread here: `step` does one
 step, so that a virtual clock can drive it through hours of trouble.
 """
 
@@ -27,7 +27,7 @@ PERIODS_OF_SILENCE = 3.0
 
 @unique
 class State(Enum):
-    """What a driver is doing."""
+    """State of a driver."""
 
     CLOSED = "closed"
     OPENING = "opening"
@@ -38,14 +38,14 @@ class State(Enum):
 
 
 class Received(NamedTuple):
-    """Something a driver said, and when it reached us."""
+    """An output of a driver, and the time at which it arrived [ns]."""
 
     received_ns: int
-    said: DriverOutput
+    output: DriverOutput
 
 
-class Keeper:
-    """One driver and what is known of how it does. ``state``, ``error`` and ``info`` may be read from any thread."""
+class DriverLifecycle:
+    """One driver and its state. ``state``, ``error`` and ``info`` may be read from any thread."""
 
     def __init__(self, name: str, driver: Driver, clock: Clock, *, fail_fast: bool = False, seed: int = 0) -> None:
         self.name = name
@@ -54,9 +54,9 @@ class Keeper:
         self.error: DriverError | None = None
         self.info: DeviceInfo | None = None
         self.last_ns: int | None = None
-        """When its last message came; None before the first."""
-        self.turned_ns = clock.now_ns()
-        """When its last step began: long ago, if the device holds its driver up."""
+        """Arrival of its last message; None before the first."""
+        self.stepped_ns = clock.now_ns()
+        """Beginning of its last step: long ago, if the device holds its driver up."""
         self.losses = 0
         self._clock = clock
         self._fail_fast = fail_fast
@@ -68,13 +68,13 @@ class Keeper:
 
     @property
     def silence_s(self) -> float:
-        """How long the driver may say nothing [s]; infinite for one that speaks only when something happens."""
+        """Longest silence of a healthy driver [s]; infinite for one that emits only when something happens."""
         least_hz = self.driver.spec.least_hz
         return max(PERIODS_OF_SILENCE / least_hz, LEAST_SILENCE_S) if least_hz > 0.0 else float("inf")
 
-    def turn(self, timeout_s: float) -> list[Received]:
-        """One step of at most about ``timeout_s``; what came, diagnostics on the driver itself among it."""
-        self.turned_ns = self._clock.now_ns()
+    def step(self, timeout_s: float) -> list[Received]:
+        """One step of at most about ``timeout_s``; what arrived, diagnostics on the driver itself among it."""
+        self.stepped_ns = self._clock.now_ns()
         if self.state is State.FAILED:
             self._clock.sleep(timeout_s)
             return []
@@ -87,7 +87,7 @@ class Keeper:
         return self._open()
 
     def close(self) -> None:
-        """Let go of the device for good."""
+        """Close the device for good."""
         self.driver.close()
         if self.state is not State.FAILED:
             self.state = State.CLOSED
@@ -106,31 +106,31 @@ class Keeper:
 
     def _poll(self, timeout_s: float) -> list[Received]:
         try:
-            said = self.driver.poll(timeout_s)
+            outputs = self.driver.poll(timeout_s)
         except DriverError as error:
             return self._lost(error)
         except Exception as error:  # noqa: BLE001 - as above
             return self._lost(_unexpected(self.name, error))
         now_ns = self._clock.now_ns()
-        if said:
-            return self._heard(said, now_ns)
+        if outputs:
+            return self._received(outputs, now_ns)
         silent_s = seconds(now_ns - max(self._opened_ns, self.last_ns or 0))
         if silent_s <= self.silence_s:
             return []
         self.state = State.STALLED
-        return self._lost(DeviceLostError(f"{self.name} has said nothing for {silent_s:.1f} s", "check its cable"))
+        return self._lost(DeviceLostError(f"{self.name} has been silent for {silent_s:.1f} s", "check its cable"))
 
-    def _heard(self, said: Sequence[DriverOutput], now_ns: int) -> list[Received]:
+    def _received(self, outputs: Sequence[DriverOutput], now_ns: int) -> list[Received]:
         back = self._is_missed
         self._is_missed = False
         self.last_ns = now_ns
         if now_ns - self._opened_ns >= HEALTHY_NS:
             self._wait_s = FIRST_WAIT_S
         news = [self._diagnostic(Level.OK, f"{self.name} is back")] if back else []
-        return [*news, *(Received(now_ns, one) for one in said)]
+        return [*news, *(Received(now_ns, output) for output in outputs)]
 
     def _lost(self, error: DriverError) -> list[Received]:
-        """Let go, tell it once, and wait: a little longer each time, and never quite as long as another robot."""
+        """Close, report it once, and wait: a little longer each time, and never quite as long as another robot."""
         self.driver.close()
         self.error = error
         if self._fail_fast or not error.passes:

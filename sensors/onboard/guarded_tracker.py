@@ -1,4 +1,4 @@
-"""One estimator among those that run live: whatever it does wrong costs its own lane and nothing else."""
+"""One estimator among those that run live: whatever it does wrong ends itself and nothing else."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fusion.certificate import Certificate
 Answer = TypeVar("Answer")
 
 
-class Lane:
+class GuardedTracker:
     """An estimator and its certificate so far. ``error`` is why it ended, "" while it goes on."""
 
     def __init__(self, name: str, estimator: Estimator[Any], prior: Prior, seed: int) -> None:

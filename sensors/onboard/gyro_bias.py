@@ -22,7 +22,7 @@ LEAST_SAMPLES = 20
 
 
 class Standstill:
-    """Watches what the sensors say, and answers with a bias at the end of five seconds of standstill."""
+    """Watches the outputs of the sensors, and reports a bias at the end of five seconds of standstill."""
 
     def __init__(self) -> None:
         self._counts: dict[str, tuple[int, ...]] = {}
@@ -30,12 +30,12 @@ class Standstill:
         self._rates: dict[str, list[float]] = {}
         self._last: dict[str, float] = {}
 
-    def hear(self, said: DriverOutput) -> list[Diagnostic]:
-        """The biases that ``said`` completes."""
-        if isinstance(said, WheelTicks):
-            return self._wheels(said)
-        if isinstance(said, Gyro) and self._since_ns is not None and said.time_ns >= self._since_ns:
-            self._rates.setdefault(said.sensor, []).append(said.rate_rad_s)
+    def take(self, output: DriverOutput) -> list[Diagnostic]:
+        """The biases that ``output`` completes."""
+        if isinstance(output, WheelTicks):
+            return self._wheels(output)
+        if isinstance(output, Gyro) and self._since_ns is not None and output.time_ns >= self._since_ns:
+            self._rates.setdefault(output.sensor, []).append(output.rate_rad_s)
         return []
 
     def _wheels(self, ticks: WheelTicks) -> list[Diagnostic]:
@@ -48,13 +48,13 @@ class Standstill:
             self._since_ns = ticks.time_ns
         if ticks.time_ns - self._since_ns < STAND_NS:
             return []
-        told = [
+        biases = [
             diagnostic
             for sensor, rates in self._rates.items()
             for diagnostic in self._bias(ticks.time_ns, sensor, rates)
         ]
         self._since_ns, self._rates = ticks.time_ns, {}
-        return told
+        return biases
 
     def _bias(self, time_ns: int, sensor: str, rates: list[float]) -> list[Diagnostic]:
         if len(rates) < LEAST_SAMPLES or (spread := stdev(rates)) > QUIET_RAD_S:

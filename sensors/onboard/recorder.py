@@ -1,4 +1,4 @@
-"""What keeps a log of all that the sensors of a robot say, and of how they, the disk and the clocks do."""
+"""Recorder of everything that the sensors of a robot emit, and of the states of sensors, disk and clocks."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from fusion.values import nanoseconds, seconds
 from logs.devices import STATUS
 from sensors.onboard.driver_lifecycle import Received, State
 from sensors.onboard.robot_file import Policy, RobotFile
-from sensors.onboard.rolling_log import SplitLog, check_space
-from sensors.onboard.sensor_loop import PATIENCE_S, Report, Sensing, Turn, check_duration
+from sensors.onboard.rolling_log import RollingLog, check_space
+from sensors.onboard.sensor_loop import PATIENCE_S, Batch, Report, SensorLoop, check_duration
 from sensors.onboard.supervisor import Status
 
 DISK_S, CLOCK_S = 5.0, 10.0
-"""How often the free disk is looked at, the clocks compared."""
+"""Periods at which the free disk is looked at, and the clocks are compared."""
 
 Answers = Sequence[tuple[str, Update]]
-"""What estimators said to one message, each with the name of its lane."""
+"""Updates by one message, each with the name of its estimator."""
 
 
 class Recorded(NamedTuple):
-    """What came of a recording. ``trouble`` is why it ended by itself, "" where it was stopped; ``warning`` is
+    """Result of a recording. ``trouble`` is why it ended by itself, "" where it was stopped; ``warning`` is
     what makes it misleading all the same, "" where nothing is known to.
     """
 
@@ -46,29 +46,29 @@ def record(
     degraded: bool = False,
     fail_fast: bool = False,
     patience_s: float = PATIENCE_S,
-    tell: Callable[[Sequence[Status], str], None] = lambda _statuses, _warning: None,
+    on_status: Callable[[Sequence[Status], str], None] = lambda _statuses, _warning: None,
 ) -> Recorded:
-    """Record until ``stop`` is set, the time is over, or it cannot go on; ``tell`` is given each second how sensors do,
-    and the warning of `Recorded` as it stands then.
+    """Record until ``stop`` is set, the time is over, or it cannot go on; ``on_status`` is called each second with the
+    status of every sensor and the warning of `Recorded` as it stands then.
 
     Raises `ParameterError` for a duration that is none, `LogError` where nothing can be written, `DriverError` where a
     required sensor does not open (unless ``degraded``), all before anything is recorded.
     """
     check_duration(duration_s)
-    sensing = Sensing(robot, fail_fast=fail_fast)
+    loop = SensorLoop(robot, fail_fast=fail_fast)
     check_policy(robot.policy, folder)
-    with sensing:
+    with loop:
         if not degraded:
-            sensing.await_open(patience_s, stop)
-        with Recorder(robot, folder, robot.start.prior(sensing.began_ns, robot.world)) as recorder:
-            for turn in sensing.turns(stop, duration_s):
-                recorder.take(turn)
-                if turn.report is not None:
-                    tell(turn.report.statuses, sensing.warning)
+            loop.await_open(patience_s, stop)
+        with Recorder(robot, folder, robot.start.prior(loop.began_ns, robot.world)) as recorder:
+            for batch in loop.batches(stop, duration_s):
+                recorder.take(batch)
+                if batch.report is not None:
+                    on_status(batch.report.statuses, loop.warning)
                 if recorder.trouble:
-                    sensing.end(recorder.trouble)
-    duration_s = seconds(sensing.clock.now_ns() - sensing.began_ns)
-    return Recorded(recorder.paths, tuple(sensing.statuses()), duration_s, sensing.trouble, sensing.warning)
+                    loop.end(recorder.trouble)
+    duration_s = seconds(loop.clock.now_ns() - loop.began_ns)
+    return Recorded(recorder.paths, tuple(loop.statuses()), duration_s, loop.trouble, loop.warning)
 
 
 def check_policy(policy: Policy, folder: Path) -> None:
@@ -77,9 +77,9 @@ def check_policy(policy: Policy, folder: Path) -> None:
 
 
 class Recorder:
-    """Writes every turn into a log; a context manager, for one thread. ``trouble`` is why it cannot go on, "" while it
-    can: a disk that refuses something ends the recording, and nothing that is on it is lost. ``refused``: lanes of
-    estimators that said something no log can hold, each with the reason; no more of those is written.
+    """Writes every batch into a log; a context manager, for one thread. ``trouble`` is why it cannot go on, "" while it
+    can: a disk that refuses something ends the recording, and nothing that is on it is lost. ``refused``:
+    estimators of which an update fits no log, each with the reason; no more of theirs is written.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class Recorder:
         """Begin a log in ``folder``; ``about`` goes into its metadata. Raises `LogError` where none can be."""
         self.trouble = ""
         self.refused: dict[str, str] = {}
-        self._log = SplitLog(robot, folder, prior, about)
+        self._log = RollingLog(robot, folder, prior, about)
         self._due_ns = dict.fromkeys((self._look_at_disk, self._compare_clocks), prior.time_ns)
         self._every_s = {self._look_at_disk: DISK_S, self._compare_clocks: CLOCK_S}
 
@@ -109,19 +109,19 @@ class Recorder:
         """Finish the last file; raises `LogError` where that cannot be."""
         self._log.close()
 
-    def take(self, turn: Turn, answers: Iterable[Answers] | None = None) -> None:
-        """Write what came, each followed by what estimators said to it, and at its own pace everything else."""
+    def take(self, batch: Batch, answers: Iterable[Answers] | None = None) -> None:
+        """Write what arrived, each followed by the updates by it, and at its own pace everything else."""
         try:
-            for received, said in zip(turn.received, repeat(()) if answers is None else answers, strict=False):
+            for received, updates in zip(batch.received, repeat(()) if answers is None else answers, strict=False):
                 self._log.write(received)
-                for lane, update in said:
-                    self._write_update(lane, update, received.received_ns)
-            if turn.report is not None:
-                self._keep(turn.report, turn.now_ns)
-            for task in [task for task, due_ns in self._due_ns.items() if due_ns <= turn.now_ns]:
+                for estimator, update in updates:
+                    self._write_update(estimator, update, received.received_ns)
+            if batch.report is not None:
+                self._keep(batch.report, batch.now_ns)
+            for task in [task for task, due_ns in self._due_ns.items() if due_ns <= batch.now_ns]:
                 task()
-                self._due_ns[task] = turn.now_ns + nanoseconds(self._every_s[task])
-            self._log.split_if_due(turn.now_ns)
+                self._due_ns[task] = batch.now_ns + nanoseconds(self._every_s[task])
+            self._log.split_if_due(batch.now_ns)
         except LogError as error:
             self.trouble = str(error)
 
@@ -132,20 +132,20 @@ class Recorder:
         except LogError as error:
             self.trouble = str(error)
 
-    def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Write a diagnostic of our own."""
+    def write_diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Write a diagnostic of the recording program itself."""
         try:
             self._log.write(Received(diagnostic.time_ns, diagnostic))
         except LogError as error:
             self.trouble = str(error)
 
-    def _write_update(self, lane: str, update: Update, now_ns: int) -> None:
-        if lane in self.refused:
+    def _write_update(self, estimator: str, update: Update, now_ns: int) -> None:
+        if estimator in self.refused:
             return
         try:
-            self._log.write_update(lane, update, now_ns)
+            self._log.write_update(estimator, update, now_ns)
         except PluginError as error:
-            self.refused[lane] = str(error)
+            self.refused[estimator] = str(error)
 
     def _keep(self, report: Report, now_ns: int) -> None:
         self._log.write_devices(report.devices, now_ns)

@@ -1,4 +1,4 @@
-"""The robot file: which sensors a robot has, by name, and how it is recorded. `docs/record.md` shows it key by key."""
+"""The robot file: the sensors of a robot by name, and the policy of its recordings. `docs/record.md` has every key."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sensors.simulation.scenario import builtin_names, load_scenario
 
 @dataclass(frozen=True)
 class Start:
-    """Where the robot stands when the recording starts; what is not given is not known."""
+    """Pose of the robot when the recording starts; what is not given is not known."""
 
     position_m: tuple[float, float] | None = None
     heading_deg: float | None = None
@@ -50,7 +50,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Policy:
-    """How the recording is kept: a new file every so many seconds or megabytes, and how much disk stays free."""
+    """Policy of a recording: a new file every so many seconds or megabytes, and how much disk stays free."""
 
     split_s: float = 600.0
     split_mb: float = 256.0
@@ -145,7 +145,7 @@ def _sensors(rows: object) -> tuple[Sensor, ...]:
     names = [sensor.name for sensor in sensors]
     for name in names:
         if names.count(name) > 1:
-            raise WorldError(f"sensors: two are called {name!r}; a log could not tell them apart, rename one")
+            raise WorldError(f"sensors: two are called {name!r}; a log cannot hold both, rename one")
     return sensors
 
 

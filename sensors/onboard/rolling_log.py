@@ -1,7 +1,7 @@
 """A recording as a series of logs, each whole by itself: world, robot file, devices and clocks stand in every one.
 
 Files are called ``NAME-BOOT-NUMBER.mcap``: the number goes on where the last recording of this boot ended, so nothing
-is ever overwritten and a wall clock that is wrong confuses nobody. Only the first file of a recording knows where the
+is ever overwritten and a wall clock that is wrong does no harm. Only the first file of a recording knows where the
 robot stood at the start; `fusion join` makes one log of them all.
 """
 
@@ -27,8 +27,8 @@ ROBOT_FILE = "robot.toml"
 """The attachment that holds the robot file."""
 
 
-class SplitLog:
-    """Where a recording goes; a context manager, owned by one thread. Raises `LogError` where it cannot be written."""
+class RollingLog:
+    """Files of a recording; a context manager, owned by one thread. Raises `LogError` where one cannot be written."""
 
     def __init__(
         self, robot: RobotFile, folder: Path, prior: Prior, about: Mapping[str, str] = MappingProxyType({})
@@ -46,7 +46,7 @@ class SplitLog:
         self._standstill = Standstill()
         self._log = self._begin(prior)
 
-    def __enter__(self) -> SplitLog:
+    def __enter__(self) -> RollingLog:
         return self
 
     def __exit__(
@@ -59,31 +59,31 @@ class SplitLog:
         self._log.close()
 
     def write(self, received: Received) -> None:
-        """Append what a driver said, at the time it was received."""
-        said, at_ns = received.said, received.received_ns
-        if isinstance(said, Diagnostic):
-            self._log.write_diagnostic(said, log_time_ns=at_ns)
-        elif isinstance(said, Truth):
-            self._log.write_truth(said, log_time_ns=at_ns)
+        """Append an output of a driver, at the time it was received."""
+        output, at_ns = received.output, received.received_ns
+        if isinstance(output, Diagnostic):
+            self._log.write_diagnostic(output, log_time_ns=at_ns)
+        elif isinstance(output, Truth):
+            self._log.write_truth(output, log_time_ns=at_ns)
         else:
-            self._log.write(said, log_time_ns=at_ns)
-        for diagnostic in self._standstill.hear(said):
+            self._log.write(output, log_time_ns=at_ns)
+        for diagnostic in self._standstill.take(output):
             self._log.write_diagnostic(diagnostic, log_time_ns=at_ns)
 
-    def write_update(self, lane: str, update: Update, now_ns: int) -> None:
-        """Append what the estimator of ``lane`` said to what was received at ``now_ns``."""
-        self._log.write_update(lane, update, log_time_ns=now_ns)
+    def write_update(self, estimator: str, update: Update, now_ns: int) -> None:
+        """Append an update of an estimator by what was received at ``now_ns``."""
+        self._log.write_update(estimator, update, log_time_ns=now_ns)
 
     def note(self, about: Mapping[str, str]) -> None:
         """Add what is known only at the end to the metadata of the last file."""
         self._log.note(about)
 
     def write_clock(self) -> None:
-        """Append how the clocks stand now."""
+        """Append the clocks at this moment."""
         self._log.write_clock(clock_sync())
 
     def write_devices(self, devices: Mapping[str, DeviceInfo], now_ns: int) -> None:
-        """Append what devices say of themselves, those that are new or opened again."""
+        """Append the descriptions of devices that are new or opened again."""
         for name, info in devices.items():
             if self._devices.get(name) is not info:
                 self._devices[name] = info
@@ -102,7 +102,7 @@ class SplitLog:
                 self._log.write_diagnostic(_about(name, info, now_ns))
 
     def lacks_mb(self) -> float:
-        """How much less than the policy wants is free on the disk [MB], after the ring gave up what it may."""
+        """Free space that the disk lacks by the policy [MB], after the ring gave up what it may."""
         wanted = self._robot.policy.min_free_mb * MEGABYTE
         while self._robot.policy.ring and free_bytes(self._folder) < wanted and (oldest := self._oldest()):
             oldest.unlink()

@@ -1,7 +1,7 @@
-"""The one loop of everything that listens to a robot's sensors: a recording, a pose now, or both.
+"""The one loop over a robot's sensors, of a recording, of a live pose, or of both.
 
-One thread a driver, and the caller's own, which takes turns: what came since the last turn, once a second how every
-sensor does. The heartbeat for the service manager comes from here, so that a caller who hangs is started anew.
+One thread a driver, and the caller's own, which takes batches: what arrived since the last one, and once a second the
+status of every sensor. The heartbeat for the service manager comes from here, so that a caller that hangs is restarted.
 """
 
 from __future__ import annotations
@@ -15,40 +15,40 @@ from typing import NamedTuple
 from fusion import BootClock, DeviceInfo, NotFoundError, ParameterError, SettingError
 from fusion.values import nanoseconds, seconds
 from logs.wheel_direction import DirectionWatch, caution
-from sensors.onboard.computer import tell_service_manager
-from sensors.onboard.driver_lifecycle import Keeper, Received, State
+from sensors.onboard.computer import notify_service_manager
+from sensors.onboard.driver_lifecycle import DriverLifecycle, Received, State
 from sensors.onboard.robot_file import RobotFile, build_driver
 from sensors.onboard.supervisor import Status, Supervisor
 
 TAKE_S = 0.2
-"""Longest time of a turn."""
+"""Longest time of a batch."""
 STATUS_S = 1.0
-"""How often it is told how sensors do."""
+"""Period of the status reports."""
 PATIENCE_S = 10.0
-"""How long a required sensor may take to open."""
+"""Time in which a required sensor must open."""
 
 
 class Report(NamedTuple):
-    """How every sensor does, in the order of the robot file, and what the open devices say of themselves."""
+    """Status of every sensor, in the order of the robot file, and the description of every open device by sensor."""
 
     statuses: Sequence[Status]
     devices: Mapping[str, DeviceInfo]
 
 
-class Turn(NamedTuple):
-    """One turn of the loop: what came, by time of arrival. ``beat``: the beat that was asked for is due; ``report``:
+class Batch(NamedTuple):
+    """One pass of the loop: what arrived, by time of arrival. ``tick``: the tick that was asked for is due; ``report``:
     once a second, None between.
     """
 
     now_ns: int
     received: Sequence[Received]
-    beat: bool
+    tick: bool
     report: Report | None
 
 
-class Sensing:
-    """All sensors of a robot, running within a ``with`` block. ``trouble`` is why the turns ended by themselves, ""
-    where they were stopped.
+class SensorLoop:
+    """All sensors of a robot, running within a ``with`` block. ``trouble`` is why the batches ended by
+    themselves, "" where they were stopped.
     """
 
     def __init__(self, robot: RobotFile, *, fail_fast: bool = False) -> None:
@@ -61,18 +61,18 @@ class Sensing:
         """Before anything can be measured: the time of the prior, since the first command to the motors must not be
         older than it."""
         self._fail_fast = fail_fast
-        self._keepers = [
-            Keeper(sensor.name, build_driver(sensor, self.clock), self.clock, fail_fast=fail_fast, seed=number)
+        self._lifecycles = [
+            DriverLifecycle(sensor.name, build_driver(sensor, self.clock), self.clock, fail_fast=fail_fast, seed=number)
             for number, sensor in enumerate(robot.sensors)
         ]
-        self._required = [k for k, sensor in zip(self._keepers, robot.sensors, strict=True) if sensor.required]
-        if found := caution(robot.world.robot, {kind for one in self._keepers for kind in one.driver.spec.kinds}):
-            raise SettingError(found.what, found.cure)
+        self._required = [k for k, sensor in zip(self._lifecycles, robot.sensors, strict=True) if sensor.required]
+        if advice := caution(robot.world.robot, {kind for one in self._lifecycles for kind in one.driver.spec.kinds}):
+            raise SettingError(advice.what, advice.cure)
         self._direction = DirectionWatch(robot.world.robot)
-        self._supervisor = Supervisor(self._keepers, self.clock)
+        self._supervisor = Supervisor(self._lifecycles, self.clock)
         self._is_over = False
 
-    def __enter__(self) -> Sensing:
+    def __enter__(self) -> SensorLoop:
         self._supervisor.__enter__()
         return self
 
@@ -82,13 +82,13 @@ class Sensing:
         self._supervisor.close()
 
     def await_open(self, patience_s: float, stop: threading.Event) -> None:
-        """Wait until every required sensor is open; raises `NotFoundError` that names those that are not, and why."""
+        """Wait until every required sensor is open; raises `NotFoundError` with those that are not, and the reasons."""
         until_ns = self.clock.now_ns() + nanoseconds(patience_s)
-        while missing := [keeper for keeper in self._required if keeper.info is None]:
-            hopeless = any(keeper.state is State.FAILED for keeper in missing)
+        while missing := [lifecycle for lifecycle in self._required if lifecycle.info is None]:
+            hopeless = any(lifecycle.state is State.FAILED for lifecycle in missing)
             if hopeless or self.clock.now_ns() >= until_ns or stop.is_set():
                 causes = "; ".join(
-                    f"{keeper.name}: {keeper.error or 'it takes too long to open'}" for keeper in missing
+                    f"{lifecycle.name}: {lifecycle.error or 'it takes too long to open'}" for lifecycle in missing
                 )
                 raise NotFoundError(
                     f"required sensors are missing: {causes}",
@@ -96,44 +96,46 @@ class Sensing:
                 )
             stop.wait(0.05)
 
-    def turns(self, stop: threading.Event, duration_s: float | None = None, beat_s: float = STATUS_S) -> Iterator[Turn]:
-        """Turn by turn until ``stop`` is set, the time is over, or `end`; the last one holds what came until every
-        driver was let go.
+    def batches(
+        self, stop: threading.Event, duration_s: float | None = None, tick_s: float = STATUS_S
+    ) -> Iterator[Batch]:
+        """Batches until ``stop`` is set, the time is over, or `end`; the last one holds what arrived until every
+        driver was closed.
         """
-        tell_service_manager("READY=1")
+        notify_service_manager("READY=1")
         began_ns = self.clock.now_ns()
         until_ns = None if duration_s is None else began_ns + nanoseconds(duration_s)
-        beat, report = _Pace(began_ns, beat_s), _Pace(began_ns, STATUS_S)
+        tick, report = _Pace(began_ns, tick_s), _Pace(began_ns, STATUS_S)
         while not (stop.is_set() or self._is_over or (until_ns is not None and self.clock.now_ns() >= until_ns)):
-            yield self._turn(beat, report)
-        tell_service_manager("STOPPING=1")
+            yield self._batch(tick, report)
+        notify_service_manager("STOPPING=1")
         self._supervisor.close()
-        yield self._turn(beat, report)
+        yield self._batch(tick, report)
 
     def end(self, trouble: str) -> None:
-        """Let the next turn be the last."""
+        """Let the next batch be the last."""
         self.trouble = self.trouble or trouble
         self._is_over = True
 
     @property
     def warning(self) -> str:
-        """What makes the measurements misleading though every sensor may do well, "" where nothing is known to."""
+        """Cause that makes the measurements misleading though every sensor may do well, "" where none is known."""
         return str(self._direction.caution or "")
 
     def statuses(self) -> Sequence[Status]:
-        """How every sensor does now."""
+        """Status of every sensor now."""
         return self._supervisor.statuses()
 
-    def _turn(self, beat: _Pace, report: _Pace) -> Turn:
-        left_s = seconds(beat.due_ns - self.clock.now_ns())
+    def _batch(self, tick: _Pace, report: _Pace) -> Batch:
+        left_s = seconds(tick.due_ns - self.clock.now_ns())
         received = self._supervisor.take(min(max(left_s, 0.0), TAKE_S))
         for one in received:
-            self._direction.take(one.said)
+            self._direction.take(one.output)
         now_ns = self.clock.now_ns()
-        return Turn(now_ns, received, beat.is_due(now_ns), self._report() if report.is_due(now_ns) else None)
+        return Batch(now_ns, received, tick.is_due(now_ns), self._report() if report.is_due(now_ns) else None)
 
     def _report(self) -> Report:
-        tell_service_manager("WATCHDOG=1")
+        notify_service_manager("WATCHDOG=1")
         statuses = self.statuses()
         for status in statuses:  # one whose device holds it up reports nothing
             if status.state is not State.RUNNING:
@@ -141,7 +143,9 @@ class Sensing:
         failed = [status for status in statuses if status.state is State.FAILED]
         if failed and self._fail_fast:
             self.end(failed[0].error)
-        return Report(statuses, {keeper.name: keeper.info for keeper in self._keepers if keeper.info is not None})
+        return Report(
+            statuses, {lifecycle.name: lifecycle.info for lifecycle in self._lifecycles if lifecycle.info is not None}
+        )
 
 
 def check_duration(duration_s: float | None) -> None:
@@ -153,7 +157,7 @@ def check_duration(duration_s: float | None) -> None:
 
 
 class _Pace:
-    """A beat that comes at once and then every so often; one that is missed is left out, not made up for."""
+    """A tick that comes at once and then every so often; one that is missed is left out, not made up for."""
 
     def __init__(self, now_ns: int, every_s: float) -> None:
         self.due_ns = now_ns

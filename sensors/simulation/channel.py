@@ -32,8 +32,8 @@ class Channel:
         field = math.sqrt(2.0 / WAVES) * np.cos(self._waves @ (x, y) + self._phases).sum()
         shadowing_db = reality.shadowing_std_db * field + stream.normal(0.0, reality.fading_std_db, count)
         loss_db = reality.wall_loss_db * self._walls(x, y)
-        heard = float(self._anchor.radio.expected(distance)) + self._offset_db + shadowing_db - loss_db
-        return float(np.mean(np.round(heard)))
+        received = float(self._anchor.radio.expected(distance)) + self._offset_db + shadowing_db - loss_db
+        return float(np.mean(np.round(received)))
 
     def range_m(self, pose: Pose, stream: np.random.Generator) -> float:
         """One range; through walls it reads too long."""

@@ -1,8 +1,8 @@
-"""The simulated robot as drivers, one per sensor: what a robot's software is tried with before there is a robot.
+"""The simulated robot as drivers, one per sensor, for trials of a robot's software before there is a robot.
 
 All sensors on one clock that name the same scenario and seed belong to one robot, which starts when the first of them
-is built. On a virtual clock a run takes no time, on the kernel's as long as a real one. What goes wrong is named in
-``faults`` (`sensors.simulation.sensor_fault`).
+is built. On a virtual clock a run takes no time, on the kernel's as long as a real one. Setting ``faults`` lists what
+goes wrong (`sensors.simulation.sensor_fault`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FAKE = MappingProxyType({"scenario": "room"})
 
 
 class Simulation:
-    """One robot in one scenario, started when this is built; which of its sensors are unplugged, or speak nonsense."""
+    """One robot in one scenario, started when this is built, with its unplugged and its garbled sensors."""
 
     def __init__(self, scenario: str, seed: int, clock: Clock) -> None:
         try:
@@ -37,7 +37,7 @@ class Simulation:
             raise SettingError(str(error), "`fusion simulate --help` lists the scenarios") from error
         self.clock = clock
         self.start_ns = clock.now_ns()
-        self.said = tuple(SimulatedRobot(self.scenario, seed).run())
+        self.messages = tuple(SimulatedRobot(self.scenario, seed).run())
         self.unplugged: set[type[Measurement | Truth]] = set()
         self.garbled: set[type[Measurement | Truth]] = set()
 
@@ -51,12 +51,12 @@ simulation = lru_cache(maxsize=4)(Simulation)
 
 
 class SimulatedSensor:
-    """What all simulated sensors share; one of the classes below is meant."""
+    """Base of all simulated sensors; robot files name a subclass."""
 
     summary: ClassVar[str]
     kind: ClassVar[type[Measurement | Truth]]
     rate: ClassVar[str] = ""
-    """The key of the scenario's reality that tells how often it speaks; "" for one that speaks when it must."""
+    """Key of its rate in the scenario's reality; "" for a sensor that sends at events."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class SimulatedSensor:
         self._name = name
         self._faults = read_faults(faults, name)
         self._robot = simulation(scenario, seed, clock)
-        self._script = [said for said in self._robot.said if isinstance(said, self.kind)]
+        self._script = [message for message in self._robot.messages if isinstance(message, self.kind)]
         self._about = {"scenario": scenario, "seed": seed}
         self._at = 0
         self._is_open = False
@@ -101,7 +101,7 @@ class SimulatedSensor:
         return DeviceInfo(f"simulated {self.kind.__name__}", settings=self._about)
 
     def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
-        """What fell due, waiting for the first of it."""
+        """Outputs that are due, after a wait for the first of them."""
         if not self._is_open or not self._is_there():
             raise DeviceLostError(f"{self._name}: the simulated device is gone", "plug it in")
         clock = self._robot.clock
@@ -114,7 +114,7 @@ class SimulatedSensor:
         return list(self._due())
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the device."""
         self._is_open = False
 
     def _is_there(self) -> bool:
@@ -122,21 +122,21 @@ class SimulatedSensor:
         return self.kind not in self._robot.unplugged and not any(f.unplugs(elapsed_ns) for f in self._faults)
 
     def _due(self) -> Iterator[DriverOutput]:
-        """What fell due since the last poll, as the faults leave it."""
+        """Outputs that fell due since the last poll, changed by the faults."""
         now_ns = self._robot.elapsed_ns()
         while self._at < len(self._script) and self._script[self._at].time_ns <= now_ns:
-            said: Measurement | Truth | None = self._script[self._at]
+            message: Measurement | Truth | None = self._script[self._at]
             self._at += 1
             for fault in self._faults:
-                said = None if said is None else fault.apply(said)
-            if said is not None:
-                yield self._signed(said)
+                message = None if message is None else fault.apply(message)
+            if message is not None:
+                yield self._stamped(message)
 
-    def _signed(self, said: Measurement | Truth) -> DriverOutput:
-        time_ns = max(said.time_ns + self._robot.start_ns, 0)  # no clock that counts from boot shows less
-        if isinstance(said, Truth):
-            return said._replace(time_ns=time_ns)
-        return replace(said, time_ns=time_ns, sensor=self._name)
+    def _stamped(self, message: Measurement | Truth) -> DriverOutput:
+        time_ns = max(message.time_ns + self._robot.start_ns, 0)  # no clock that counts from boot shows less
+        if isinstance(message, Truth):
+            return message._replace(time_ns=time_ns)
+        return replace(message, time_ns=time_ns, sensor=self._name)
 
 
 class SimulatedEncoders(SimulatedSensor):
@@ -146,23 +146,23 @@ class SimulatedEncoders(SimulatedSensor):
 
 
 class SimulatedMotors(SimulatedSensor):
-    """What the motors are told."""
+    """Commands to the motors."""
 
     summary, kind = "motor commands of a simulated robot with single-channel encoders", MotorCommand
 
     def open(self) -> DeviceInfo:
-        """As for all; the command that stands is told first, or nobody would know which way the wheels turn."""
+        """As for all; the command in force comes first, since the direction of the wheels depends on it."""
         info = super().open()
         before = self._script[self._at - 1] if self._at else None
         self._standing = before if isinstance(before, MotorCommand) else None
         return info
 
     def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
-        """What fell due."""
+        """As for all, the command in force first."""
         if self._standing is None:
             return super().poll(timeout_s)
         standing, self._standing = self._standing, None
-        return [self._signed(replace(standing, time_ns=self._robot.elapsed_ns()))]
+        return [self._stamped(replace(standing, time_ns=self._robot.elapsed_ns()))]
 
 
 class SimulatedGyro(SimulatedSensor):
@@ -184,9 +184,9 @@ class SimulatedRanges(SimulatedSensor):
 
 
 class SimulatedTracker(SimulatedSensor):
-    """A motion-capture system that knows where the robot really is."""
+    """A motion-capture system that measures the true pose of the robot."""
 
-    summary, kind, rate = "where a simulated robot really is", Truth, "truth_hz"
+    summary, kind, rate = "true pose of a simulated robot", Truth, "truth_hz"
 
 
 class SimulatedDevice:
@@ -201,11 +201,11 @@ class SimulatedDevice:
     def speak(self) -> None:
         """Let time pass until just before the sensor's next message."""
         elapsed_ns = self._robot.elapsed_ns()
-        due = (s.time_ns for s in self._robot.said if isinstance(s, self._kind) and s.time_ns > elapsed_ns)
+        due = (s.time_ns for s in self._robot.messages if isinstance(s, self._kind) and s.time_ns > elapsed_ns)
         self.clock.sleep(seconds(next(due, elapsed_ns) - elapsed_ns - 1))
 
     def garble(self) -> None:
-        """Let it say something that nobody understands."""
+        """Let it send something that cannot be parsed."""
         self._robot.garbled.add(self._kind)
 
     def unplug(self) -> None:

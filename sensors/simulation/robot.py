@@ -1,4 +1,4 @@
-"""A simulated robot on a virtual clock: the same messages a real one would send, and where it really was.
+"""A simulated robot on a virtual clock: the same messages a real one would send, and its true poses.
 
 Every source of chance has its own random stream, spawned from the seed by name, so that a change to one sensor leaves
 the noise of all others as it was.
@@ -51,8 +51,8 @@ class SimulatedRobot:
         calibration = self._stream("calibration")
         self._roll_scale = 1.0 + reality.distance_scale_bias + calibration.normal(0.0, reality.distance_scale_std)
         self._track_scale = 1.0 + reality.track_scale_bias + calibration.normal(0.0, reality.track_scale_std)
-        told = scenario.world.robot.gyro_bias_rad_s
-        self._gyro_bias = told + calibration.normal(0.0, reality.gyro_bias_std_rad_s)
+        nominal = scenario.world.robot.gyro_bias_rad_s
+        self._gyro_bias = nominal + calibration.normal(0.0, reality.gyro_bias_std_rad_s)
         self._channels = {
             anchor.id: Channel(anchor, self._stream(f"radio {anchor.id}"), scenario)
             for anchor in scenario.world.anchors
@@ -64,7 +64,7 @@ class SimulatedRobot:
         return np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=(zlib.crc32(name.encode()),)))
 
     def prior(self) -> Prior:
-        """The start as a person would measure it: off by what its covariance says."""
+        """The start as a person would measure it: off by an error drawn from its covariance."""
         reality, first = self.scenario.reality, drive(self.scenario.route)[0]
         place, heading = reality.start_std_m, reality.start_heading_std_rad
         off = self._stream("start").normal(0.0, 1.0, 3) * (place, place, heading)
@@ -109,7 +109,7 @@ class SimulatedRobot:
 
     @property
     def _single_channel(self) -> bool:
-        """One channel counts edges and cannot see their direction: only the command to the motors tells it."""
+        """One channel counts edges and cannot see their direction: only the command to the motors determines it."""
         return self.scenario.world.robot.encoder == "single_channel"
 
     def _commanded(self, moments: tuple[Moment, ...]) -> set[int]:
@@ -120,7 +120,7 @@ class SimulatedRobot:
         return {step for step, (before, now) in enumerate(itertools.pairwise(asked)) if before != now}
 
     def _command(self, step: int, moment: Moment) -> MotorCommand:
-        """What the controller asks of the motors as the step begins: it knows the nominal track only."""
+        """Command of the controller to the motors as the step begins, by the nominal track."""
         robot = self.scenario.world.robot
         sideways = 0.5 * robot.track_width_m * moment.turn_rate
         sides = (moment.speed - sideways, moment.speed + sideways)
@@ -128,14 +128,14 @@ class SimulatedRobot:
         return MotorCommand(moment.time_ns - nanoseconds(STEP_S), "motors", step, sides * axles)
 
     def _roll(self, moments: tuple[Moment, ...]) -> Steps:
-        """What the left and right encoders have counted by the end of each step [m], (n, 2).
+        """Counts of the left and right encoders by the end of each step [m], (n, 2).
 
         A slipping wheel rolls further than the robot goes.
         """
         robot = self.scenario.world.robot
         speed = np.array([moment.speed for moment in moments])
         turn_rate = np.array([moment.turn_rate for moment in moments])
-        # The distance scale that the world tells corrects the path alone; its track width is the effective one already.
+        # The distance scale of the world corrects the path alone; its track width is the effective one already.
         ahead = speed / robot.distance_scale
         sideways = 0.5 * robot.track_width_m * self._track_scale * turn_rate
         blocks = -(-len(moments) // SLIP_STEPS)
@@ -148,7 +148,7 @@ class SimulatedRobot:
     def _turn_rates(self, moments: tuple[Moment, ...]) -> Steps:
         """The mean turn rate [rad/s] of the gyro period that ends with each step, (n,).
 
-        A gyro samples far faster than it reports, and its low-pass filter keeps what it turned in between.
+        A gyro samples far faster than it reports, and its low-pass filter keeps the turn in between.
         """
         period = self._periods().get("gyro", 1)
         turned = np.cumsum([moment.turn_rate for moment in moments])
@@ -179,14 +179,15 @@ class SimulatedRobot:
     def _scan(self, step: int, moment: Moment, count: int) -> WifiScan:
         """The mean of ``count`` scans in a row, without the anchors that are too weak on average."""
         stream, deaf = self._streams["wifi"], self.scenario.reality.deaf_below_dbm
-        heard = {
+        strengths = {
             name: channel.rssi_dbm(moment.pose, stream, count) - self._obstruction_db()
             for name, channel in self._channels.items()
         }
-        return WifiScan(moment.time_ns, "wifi", step, tuple(RssiReading(n, r) for n, r in heard.items() if r >= deaf))
+        readings = tuple(RssiReading(name, rssi) for name, rssi in strengths.items() if rssi >= deaf)
+        return WifiScan(moment.time_ns, "wifi", step, readings)
 
     def _obstruction_db(self) -> float:
-        """What people and things that stand in the way of one link take off for one scan, or for one stop [dB]."""
+        """Loss by people and things in the way of one link, for one scan or one stop [dB]."""
         reality, stream = self.scenario.reality, self._streams["obstruction"]
         obstructed, loss_db = (
             stream.random() < reality.obstruction_share,

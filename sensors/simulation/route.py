@@ -1,4 +1,4 @@
-"""Where the simulated robot really goes: its true motion along the route, on a virtual clock."""
+"""True motion of the simulated robot along its route, on a virtual clock."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""What a simulated run is made of: a TOML file with three parts that are kept strictly apart.
+"""Scenario of a simulated run: a TOML file with three parts that are kept strictly apart.
 
-``[world]`` is what estimators are told (a world file, `docs/world.md`), ``[route]`` is where the robot is driven, and
-``[reality]`` is what is really so and nobody is told: shadowing, walls that swallow signal, slipping wheels, a gyro
-bias. ``[calibration]`` may say how the numbers were found; it is for people and reports. The built-in scenarios carry
-the paper's path-loss exponents; their floor plans and anchor places are our own, since the paper's drawings are not
-published as data.
+``[world]`` is given to the estimators (a world file, `docs/world.md`), ``[route]`` is where the robot is driven, and
+``[reality]`` is hidden from them: shadowing, walls that absorb signal, slipping wheels, a gyro bias. ``[calibration]``
+may describe the method behind the numbers; it is for people and reports. The built-in scenarios carry the paper's
+path-loss exponents; their floor plans and anchor places are our own, since the paper's drawings are not published as
+data.
 """
 
 from __future__ import annotations
@@ -38,27 +38,27 @@ class Route:
 
 @dataclass(frozen=True, slots=True)
 class Reality:
-    """What the estimators are not told. Deviations are drawn once a run from the standard deviations given."""
+    """Hidden from the estimators. Deviations are drawn once a run from the standard deviations given."""
 
     anchor_offset_std_db: float = 1.0
     shadowing_std_db: float = 2.0
-    """Shadowing that belongs to the place [dB], alike over ``shadowing_length_m``."""
+    """Shadowing that belongs to the place [dB], correlated over ``shadowing_length_m``."""
     shadowing_length_m: float = 2.0
     fading_std_db: float = 1.5
     """Scan to scan [dB]."""
     wall_loss_db: float = 4.0
     obstruction_share: float = 0.0
-    """How often something stands in the way of a link, drawn anew for every scan or stop; it takes an exponentially
-    distributed loss of ``obstruction_mean_db`` off."""
+    """Probability that something stands in the way of a link, drawn anew for every scan or stop, with an exponentially
+    distributed loss of mean ``obstruction_mean_db``."""
     obstruction_mean_db: float = 6.0
     deaf_below_dbm: float = -92.0
     range_std_m: float = 0.1
     wall_excess_m: float = 0.3
     """Mean excess of a range through walls [m]."""
     distance_scale_bias: float = 0.0
-    """Wheels that roll further than the world says, as a share, the same in every run."""
+    """Wheels that roll further than by the world, as a share, the same in every run."""
     track_scale_bias: float = 0.0
-    """An effective track that is wider than the world says, as a share, the same in every run."""
+    """An effective track that is wider than in the world, as a share, the same in every run."""
     distance_scale_std: float = 0.02
     track_scale_std: float = 0.05
     slip_std: float = 0.006

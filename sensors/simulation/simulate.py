@@ -1,4 +1,4 @@
-"""`fusion simulate`: drive a simulated robot and record what its sensors say."""
+"""`fusion simulate`: drive a simulated robot and record its sensors."""
 
 from __future__ import annotations
 
@@ -42,15 +42,15 @@ def simulate(scenario: str | Path, output: Path, *, seed: int = 0, duration_s: f
 def simulated_run(scenario: Scenario, seed: int) -> Run:
     """One run in memory: as reading the log of `simulate` back, but for its path and the rounding of headings."""
     robot = SimulatedRobot(scenario, seed)
-    said = list(robot.run())
+    messages = list(robot.run())
     return Run(
         path=Path(f"{scenario.name}-{seed}.mcap"),
         name=f"{scenario.name}-{seed}",
         world=scenario.world,
         prior=robot.prior(),
         metadata=_about(scenario, seed),
-        measurements=tuple(message for message in said if not isinstance(message, Truth)),
-        truth=TruthTrack.from_truths([message for message in said if isinstance(message, Truth)]),
+        measurements=tuple(message for message in messages if not isinstance(message, Truth)),
+        truth=TruthTrack.from_truths([message for message in messages if isinstance(message, Truth)]),
         warnings=(),
         lanes={},
     )

@@ -15,12 +15,12 @@ from typing import ClassVar
 from fusion import ProtocolError
 from sensors.uwb.fake_serial import FakeSerial, fake_serial
 from sensors.uwb.serial_port import Line
-from sensors.uwb.serial_ranging import Heard, SerialRanging, sound_range
+from sensors.uwb.serial_ranging import ModuleReport, SerialRanging, sound_range
 
 BINARY_ANSWER = b"\x40\x01"
 PROMPT = b"dwm>"
 LISTEN_S, ANSWER_S = 0.5, 3.0
-"""How long to look for lines that flow, and for an answer: a module at rest reports every tenth of a second."""
+"""Time to wait for reports, and for an answer: a module at rest reports every tenth of a second."""
 TRIES = 3
 ANCHOR, ID, DECIMAL = re.compile(r"AN\d"), re.compile(r"[0-9A-Fa-f]{4}"), re.compile(r"-?\d+\.\d+")
 SHORT = re.compile(r"([0-9A-Fa-f]{4})\[(-?\d+\.\d+),(-?\d+\.\d+),(-?\d+\.\d+)\]=(\d+\.\d+)")
@@ -28,8 +28,8 @@ SHORT = re.compile(r"([0-9A-Fa-f]{4})\[(-?\d+\.\d+),(-?\d+\.\d+),(-?\d+\.\d+)\]=
 FLOWING = re.compile(rb"DIST,|POS,|[0-9A-Fa-f]{4}\[")
 
 
-def parse(text: str) -> Heard:
-    """What a line of ``lec``, ``lep`` or ``les`` says; the names of anchors are their four hexadecimal digits.
+def parse(text: str) -> ModuleReport:
+    """Report in a line of ``lec``, ``lep`` or ``les``; the names of anchors are their four hexadecimal digits.
 
     >>> parse("DIST,2,AN0,0A1B,0.00,0.00,0.00,1.25,AN1,15BA,0.00,0,AN1,15BA,1.00,0.00,0.00,2.50").ranges
     (('0A1B', 1.25, None), ('15BA', 2.5, None))
@@ -45,7 +45,7 @@ def parse(text: str) -> Heard:
     ranges = [(block[0].upper(), sound_range(block[4]), None) for block in whole]
     places = tuple((f"place {block[0].upper()}", ",".join(block[1:4])) for block in whole)
     known = tuple((anchor, range_m, std_m) for anchor, range_m, std_m in ranges if range_m is not None)
-    return Heard(known, len(blocks) - len(known), (*places, *_position(tokens)))
+    return ModuleReport(known, len(blocks) - len(known), (*places, *_position(tokens)))
 
 
 def _is_whole(block: list[str]) -> bool:
@@ -60,7 +60,7 @@ def _position(tokens: list[str]) -> tuple[tuple[str, str], ...]:
     return (("position", ",".join(tokens[tokens.index("POS") + 1 :][:4])),)
 
 
-def _short(text: str) -> Heard:
+def _short(text: str) -> ModuleReport:
     """The form of ``les``: anchors apart by blanks."""
     blocks = [word for word in text.split() if "]=" in word]
     found = [match for word in blocks if (match := SHORT.fullmatch(word))]
@@ -69,7 +69,7 @@ def _short(text: str) -> Heard:
     own = re.search(r"est\[([^\]]*)\]", text)
     is_other = not blocks and own is None and not text.startswith("dwm>")
     values = (*places, *((("position", own[1]),) if own else ()))
-    return Heard(ranges, len(blocks) - len(ranges) + is_other, values)
+    return ModuleReport(ranges, len(blocks) - len(ranges) + is_other, values)
 
 
 class UwbDwm1001(SerialRanging):
@@ -109,7 +109,7 @@ class UwbDwm1001(SerialRanging):
             collected += self._port.read(0.05)
         return collected
 
-    def _hear(self, line: Line) -> Iterator[tuple[int, Heard]]:
+    def _reports(self, line: Line) -> Iterator[tuple[int, ModuleReport]]:
         yield line.time_ns, parse(line.text)
 
 
@@ -122,7 +122,7 @@ class FakeShell:
         self.reports = False
 
     def answer(self, data: bytes) -> bytes:
-        """What the module sends back for ``data``."""
+        """Answer of the module to ``data``."""
         if not self._is_shell:
             self._returns += data.count(b"\r")
             if self._returns < 2:

@@ -21,16 +21,16 @@ REPORT_S = 0.1
 
 
 class Talker(Protocol):
-    """The firmware of a fake device: what it answers, and whether it reports by itself."""
+    """The firmware of a fake device: its answers, and whether it reports by itself."""
 
     reports: bool
 
     def answer(self, data: bytes) -> bytes:
-        """What it sends back for ``data``."""
+        """Answer to ``data``."""
 
 
 class Mute:
-    """A firmware that only speaks when it is told to by the test."""
+    """A firmware that sends only when the test asks for it."""
 
     reports = False
 
@@ -40,7 +40,7 @@ class Mute:
 
 
 class FakeSerial:
-    """The device: ``speech`` is one whole thing it says, ``nonsense`` what nobody understands."""
+    """The device: ``speech`` is one whole message of it, ``nonsense`` cannot be parsed."""
 
     def __init__(self, folder: Path, speech: bytes, nonsense: bytes, talker: Talker) -> None:
         self.clock = BootClock()
@@ -52,11 +52,11 @@ class FakeSerial:
         self._gone = threading.Event()
 
     def speak(self) -> None:
-        """Say one whole thing."""
+        """Send one whole message."""
         self._send(self._speech)
 
     def garble(self) -> None:
-        """Say nonsense."""
+        """Send nonsense."""
         self._send(self._nonsense)
 
     def plug(self) -> None:
@@ -85,7 +85,7 @@ class FakeSerial:
             os.write(self._ends[0], data)
 
     def _serve(self, ours: int) -> None:
-        """Answer what is asked, and report while the firmware is told to."""
+        """Answer requests, and report while the firmware is set to."""
         while not self._gone.is_set():
             if select.select([ours], [], [], REPORT_S / 2.0)[0]:
                 with suppress(OSError):

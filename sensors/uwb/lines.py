@@ -17,11 +17,11 @@ from typing import ClassVar
 
 from sensors.uwb.fake_serial import FakeSerial, fake_serial
 from sensors.uwb.serial_port import Line
-from sensors.uwb.serial_ranging import Heard, SerialRanging, sound_range
+from sensors.uwb.serial_ranging import ModuleReport, SerialRanging, sound_range
 
 
-def parse(text: str) -> Heard:
-    """What one line says.
+def parse(text: str) -> ModuleReport:
+    """Report in one line.
 
     >>> parse("R,a,1.5;b,2.5,0.1;c,x").ranges
     (('a', 1.5, None), ('b', 2.5, 0.1))
@@ -30,15 +30,15 @@ def parse(text: str) -> Heard:
     """
     kind, _, rest = text.partition(",")
     if text.startswith("#"):
-        return Heard(values=(("text", text[1:].strip()),))
+        return ModuleReport(values=(("text", text[1:].strip()),))
     if kind == "F":
         anchor, _, why = rest.partition(",")
-        return Heard(values=((anchor, why or "failed"),))
+        return ModuleReport(values=((anchor, why or "failed"),))
     if kind != "R":
-        return Heard(refused=1)
+        return ModuleReport(refused=1)
     found = [_reading(block.split(",")) for block in rest.split(";")]
     ranges = tuple(reading for reading in found if reading is not None)
-    return Heard(ranges, refused=len(found) - len(ranges))
+    return ModuleReport(ranges, refused=len(found) - len(ranges))
 
 
 def _reading(words: list[str]) -> tuple[str, float, float | None] | None:
@@ -62,5 +62,5 @@ class UwbLines(SerialRanging):
         """A module that ranges two anchors."""
         return fake_serial(b"R,a,3.41;b,5.02,0.1\n", b"R,a,\xff\xfe;;\n")
 
-    def _hear(self, line: Line) -> Iterator[tuple[int, Heard]]:
+    def _reports(self, line: Line) -> Iterator[tuple[int, ModuleReport]]:
         yield line.time_ns, parse(line.text)

@@ -5,7 +5,7 @@
      [mac_address=0x0002, status="RX_TIMEOUT"]}
 
 One notification spans lines, or stands in one, by firmware; it ends where its braces balance. A gap in the numbers of
-the sequence tells how many were lost.
+the sequence counts the lost ones.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import ClassVar
 
 from sensors.uwb.fake_serial import FakeSerial, fake_serial
 from sensors.uwb.serial_port import Line
-from sensors.uwb.serial_ranging import Heard, SerialRanging, sound_range
+from sensors.uwb.serial_ranging import ModuleReport, SerialRanging, sound_range
 
 START = "SESSION_INFO_NTF:"
 LONGEST = 8192
@@ -26,12 +26,12 @@ SUCCESS = "SUCCESS"
 CENTIMETRE = 0.01
 
 
-def parse(frame: str) -> Heard:
-    """What one whole notification says; anchors go by the hexadecimal digits of their address, in capitals.
+def parse(frame: str) -> ModuleReport:
+    """Report in one whole notification; anchors go by the hexadecimal digits of their address, in capitals.
 
     >>> parse('SESSION_INFO_NTF: {[mac_address=0x1a, status="SUCCESS", distance[cm]=29]; '
     ...       '[mac_address=0x2b, status="RX_TIMEOUT"]}')
-    Heard(ranges=(('1A', 0.29, None),), refused=0, values=(('2B', 'RX_TIMEOUT'),))
+    ModuleReport(ranges=(('1A', 0.29, None),), refused=0, values=(('2B', 'RX_TIMEOUT'),))
     """
     ranges: list[tuple[str, float, float | None]] = []
     failures: list[tuple[str, str]] = []
@@ -47,7 +47,7 @@ def parse(frame: str) -> Heard:
             ranges.append((address[1].upper(), range_m, None))
         else:
             refused += 1
-    return Heard(tuple(ranges), refused, tuple(failures))
+    return ModuleReport(tuple(ranges), refused, tuple(failures))
 
 
 class Frames:
@@ -96,13 +96,13 @@ class UwbQm33(SerialRanging):
         self._sequence: int | None = None
         return super()._begin()
 
-    def _hear(self, line: Line) -> Iterator[tuple[int, Heard]]:
+    def _reports(self, line: Line) -> Iterator[tuple[int, ModuleReport]]:
         for time_ns, frame, is_whole in self._frames.feed(line):
-            heard = parse(frame) if is_whole else Heard(refused=1)
-            yield time_ns, heard._replace(values=heard.values + self._lost(frame))
+            report = parse(frame) if is_whole else ModuleReport(refused=1)
+            yield time_ns, report._replace(values=report.values + self._lost(frame))
 
     def _lost(self, frame: str) -> tuple[tuple[str, str], ...]:
-        """How many notifications never came, by the gap in their numbers."""
+        """Count of lost notifications, by the gap in their numbers."""
         number = re.search(r"sequence_number=(\d+)", frame)
         if number is None:
             return ()

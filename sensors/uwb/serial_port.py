@@ -1,5 +1,5 @@
-"""A serial port as drivers want it: typed errors, reads that wait no longer than told, lines with the time of their
-first byte. The one place that knows the serial library.
+"""A serial port for drivers: typed errors, reads with a time limit, lines with the time of their first byte. The one
+place that knows the serial library.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class SerialPort:
         self._port: Any = None
 
     def open(self) -> None:
-        """Open it for ourselves alone; raises a `DriverError` that says what to do."""
+        """Open it for ourselves alone; raises a `DriverError` with the remedy."""
         self.close()
         try:
             import serialx
@@ -46,7 +46,7 @@ class SerialPort:
         self._port = port
 
     def read(self, timeout_s: float) -> bytes:
-        """What came, waiting at most so long for its first byte; empty when nothing did."""
+        """Bytes that arrived, after a wait of at most so long for the first; empty when none did."""
         port = self._require()
         try:
             if not select.select([port.fileno()], [], [], max(timeout_s, 0.0))[0]:
@@ -82,7 +82,7 @@ class SerialPort:
 
 
 def opening_error(path: str, error: OSError) -> DriverError:
-    """What the refusal to open a port means (open(2), flock(2))."""
+    """Error for a refusal to open a port (open(2), flock(2))."""
     if error.errno == errno.ENOTTY:
         return NotFoundError(f"{path} is no serial port", "give the path of a port: `fusion sensors` lists them")
     absent = "plug it in; `fusion sensors` lists the ports that are there"
@@ -144,5 +144,5 @@ class LineReader:
 
     @property
     def unfinished(self) -> str:
-        """What came after the last end of a line: a prompt, perhaps."""
+        """Text after the last end of a line: a prompt, perhaps."""
         return self._rest.decode("ascii", "replace")

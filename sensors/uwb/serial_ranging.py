@@ -1,7 +1,7 @@
-"""What UWB modules on a serial port have in common: a port, lines, ranges with the names of anchors.
+"""Base of the drivers for UWB modules on a serial port: a port, lines, ranges with the names of anchors.
 
-A reading that cannot be understood costs that reading, a line that cannot be understood that line; both are told, and
-counted. The device's own position and its failures are diagnostics: no estimator sees them, the log keeps them.
+A reading that cannot be understood costs that reading, a line that cannot be understood that line; both are reported,
+and counted. The device's own position and its failures are diagnostics: no estimator sees them, the log keeps them.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ LONGEST_RANGE_M = 1000.0
 NONE: Mapping[str, str] = MappingProxyType({})
 
 
-class Heard(NamedTuple):
-    """What one line, or one notification, says: ranges [m] by the device's own names of anchors."""
+class ModuleReport(NamedTuple):
+    """Content of one line, or one notification: ranges [m] by the device's own names of anchors."""
 
     ranges: tuple[tuple[str, float, float | None], ...] = ()
     """Name, range [m], and its standard deviation [m] where the device claims one."""
     refused: int = 0
     """Readings in it that cannot be understood."""
     values: tuple[tuple[str, str], ...] = ()
-    """What else it says: its own position, failures."""
+    """Everything else in it: its own position, failures."""
 
 
 def sound_range(text: str, unit_m: float = 1.0) -> float | None:
@@ -55,11 +55,11 @@ def sound_range(text: str, unit_m: float = 1.0) -> float | None:
 
 
 class SerialRanging:
-    """A UWB module on a serial port; one of the drivers that derive from this is meant.
+    """A UWB module on a serial port; base of a driver for each firmware.
 
     ``names`` gives a device's name of an anchor the world's; a name that is not in it stays as it is. ``start`` is a
-    line sent to the module when it is opened, for a firmware that waits to be told. ``std_m`` stands for the standard
-    deviation that the device does not claim.
+    line sent to the module when it is opened, for a firmware that waits for a command. ``std_m`` stands for the
+    standard deviation that the device does not claim.
     """
 
     summary: ClassVar[str]
@@ -109,40 +109,41 @@ class SerialRanging:
         return DeviceInfo(self.model, firmware=firmware, settings=settings)
 
     def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
-        """What came."""
-        said = [one for line in self._lines.feed(self._port.read(timeout_s)) for one in self._said(line)]
+        """Ranges and diagnostics of the lines that arrived."""
+        lines = self._lines.feed(self._port.read(timeout_s))
+        outputs = [output for line in lines for output in self._outputs(line)]
         if self._lines.overlong > self._overlong:
             self._overlong = self._lines.overlong
-            said.append(self._diagnostic(self._clock.now_ns(), "a line without an end was dropped"))
-        return said
+            outputs.append(self._diagnostic(self._clock.now_ns(), "a line without an end was dropped"))
+        return outputs
 
     def close(self) -> None:
-        """Let go of the port. The module goes on reporting."""
+        """Close the port. The module goes on reporting."""
         self._port.close()
 
     def _begin(self) -> str:
-        """Have the module report; answers its firmware, where it says so."""
+        """Have the module report; its firmware version, "" where it does not report one."""
         if self._start:
             self._port.write(self._start.encode() + b"\r\n")
         return ""
 
-    def _hear(self, line: Line) -> Iterator[tuple[int, Heard]]:
-        """What a line says, and when that was true [ns]."""
+    def _reports(self, line: Line) -> Iterator[tuple[int, ModuleReport]]:
+        """Reports of a line, each with the time at which it was true [ns]."""
         raise NotImplementedError
 
-    def _said(self, line: Line) -> Iterator[DriverOutput]:
-        for time_ns, heard in self._hear(line):
-            if heard.ranges:
+    def _outputs(self, line: Line) -> Iterator[DriverOutput]:
+        for time_ns, report in self._reports(line):
+            if report.ranges:
                 self._seq += 1
                 readings = tuple(
                     RangeReading(self._names.get(anchor, anchor), range_m, self._std_m if std_m is None else std_m)
-                    for anchor, range_m, std_m in heard.ranges
+                    for anchor, range_m, std_m in report.ranges
                 )
                 yield Ranges(time_ns, self._name, self._seq, readings)
-            if heard.values:
-                yield Diagnostic(time_ns, self._name, Level.OK, "told beside the ranges", heard.values)
-            if heard.refused:
-                yield self._diagnostic(time_ns, f"{heard.refused} readings cannot be understood", line.text)
+            if report.values:
+                yield Diagnostic(time_ns, self._name, Level.OK, "reported beside the ranges", report.values)
+            if report.refused:
+                yield self._diagnostic(time_ns, f"{report.refused} readings cannot be understood", line.text)
 
     def _diagnostic(self, time_ns: int, text: str, line: str = "") -> Diagnostic:
         return Diagnostic(time_ns, self._name, Level.WARN, text, (("line", line[:200]),) if line else ())

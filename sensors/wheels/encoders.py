@@ -51,7 +51,7 @@ class Encoders:
         debounce_s: float = 0.001,
         device: Callable[[], Lines] = GpioLines,
     ) -> None:
-        """``hz``: how often the counts are told, also when nothing turns. ``device`` stands in for the chip."""
+        """``hz``: rate of the reports, also when nothing turns. ``device`` stands in for the chip."""
         if not lines or len(set(lines)) != len(lines) or any(type(line) is not int or line < 0 for line in lines):
             raise SettingError(f"{name}: lines = {list(lines)}", "give the offset of one line for each wheel")
         if not (hz > 0.0 and 0.0 <= debounce_s < 1.0):
@@ -78,7 +78,7 @@ class Encoders:
     @classmethod
     @contextmanager
     def fake(cls) -> Iterator[FakeLines]:
-        """Two wheels that turn when they are told to."""
+        """Two wheels that turn when they are asked to."""
         yield FakeLines()
 
     def open(self) -> DeviceInfo:
@@ -127,7 +127,7 @@ class Encoders:
             self._number[edge.line] = edge.number
 
     def _report(self, now_ns: int) -> Iterator[DriverOutput]:
-        """The counts, true a debouncing time ago: an edge since then may not have been told yet.
+        """The counts, true a debouncing time ago: an edge since then may not have been reported yet.
 
         Reports fall due at whole periods. One that is held up puts off the next, so that none follows within half a
         period: a single tick in next to no time would look like great speed.

@@ -22,7 +22,7 @@ class FakeLines:
         self._edges: list[Edge] = []
 
     def turn(self, ticks: int) -> None:
-        """Both wheels roll on by so many ticks; what nobody reads is lost but for the last `BUFFER` edges."""
+        """Both wheels roll on by so many ticks; what is not read is lost but for the last `BUFFER` edges."""
         for _ in range(ticks):
             for line in self._numbers:
                 self._numbers[line] += 1
@@ -30,7 +30,7 @@ class FakeLines:
         del self._edges[:-BUFFER]
 
     def speak(self) -> None:
-        """Turn by a few ticks; the next report tells."""
+        """Turn by a few ticks, for the next report."""
         self.turn(3)
 
     def garble(self) -> None:
@@ -53,13 +53,13 @@ class FakeLines:
         self._edges = []
 
     def wait(self, timeout_s: float) -> bool:
-        """As the kernel does: a chip that is gone is always ready, and reading tells why."""
+        """As the kernel does: a chip that is gone is always ready, and reading gives the reason."""
         if not self._edges and self._is_there:
             self.clock.sleep(timeout_s)
         return bool(self._edges) or not self._is_there
 
     def read(self) -> list[Edge]:
-        """What was seen."""
+        """Edges since the last read."""
         if not self._is_there:
             raise OSError(errno.ENODEV, "No such device")
         edges, self._edges = self._edges, []

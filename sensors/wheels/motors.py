@@ -1,11 +1,11 @@
-"""What the motors are told: commands that the robot's motor controller sends to a socket, one datagram each.
+"""Commands to the motors, which the robot's motor controller sends to a socket, one datagram each.
 
     import json, socket
     socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM).sendto(json.dumps([0.3, 0.3]).encode(), "/run/fusion/motors")
 
 The numbers are the signed speeds of the wheels [m/s], in the order of the world's robot. A single-channel encoder
-cannot see its direction, and takes it from here; a command stands until the next. The controller says it again now and
-then, so that a recorder which begins later knows it.
+cannot see its direction, and takes it from here; a command stands until the next. The controller repeats it now and
+then, for a recorder that begins later.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Motors:
     @classmethod
     @contextmanager
     def fake(cls) -> Iterator[FakeController]:
-        """A controller that sends when it is told to."""
+        """A controller that sends when it is asked to."""
         with tempfile.TemporaryDirectory() as folder:
             yield FakeController(Path(folder) / "run")
 

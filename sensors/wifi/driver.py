@@ -1,4 +1,4 @@
-"""What the two Wi-Fi drivers share: opening all or nothing, polling their loop, telling loss from silence."""
+"""Base of the two Wi-Fi drivers: opening all or nothing, polling their loop, distinguishing loss from silence."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from sensors.wifi.nl80211 import KernelTransport, Nl80211, Transport
 
 
 class WifiDriver(ABC, Generic[Result]):
-    """A driver of one interface; a subclass brings the loop, and says what comes of its results."""
+    """A driver of one interface; a subclass adds the loop and the outputs of its results."""
 
     groups: ClassVar[tuple[str, ...]] = ()
-    """Groups of events to hear."""
+    """Groups of events to join."""
 
     def __init__(self, name: str, clock: Clock, interface: str, device: Transport | None) -> None:
         self._name, self._clock = name, clock
@@ -48,7 +48,7 @@ class WifiDriver(ABC, Generic[Result]):
         return DeviceInfo(model, serial=interface.mac, settings=MappingProxyType(dict(settings)))
 
     def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
-        """What came of a scan or a round, or what went wrong, or nothing yet."""
+        """Outputs of a scan or a round, or a diagnostic of its failure, or nothing yet."""
         if self._loop is None or self._interface is None:
             raise DeviceLostError(f"{self._name} is not open", "open it")
         try:
@@ -63,7 +63,7 @@ class WifiDriver(ABC, Generic[Result]):
             return []
         if isinstance(outcome, Trouble):
             return [Diagnostic(self._clock.now_ns(), self._name, Level.WARN, outcome.text)]
-        return self._told(outcome)
+        return self._outputs(outcome)
 
     def close(self) -> None:
         """Let go of the socket; what the radio is doing ends by itself."""
@@ -79,5 +79,5 @@ class WifiDriver(ABC, Generic[Result]):
         """The settings in force, for the log."""
 
     @abstractmethod
-    def _told(self, result: Result) -> list[DriverOutput]:
-        """What a result comes to."""
+    def _outputs(self, result: Result) -> list[DriverOutput]:
+        """Measurements and diagnostics of a result."""

@@ -1,4 +1,4 @@
-"""What a kernel's refusal means, and what cures it: one row per errno, for scans and for ranging.
+"""Errors for the kernel's refusals, with their cures: one row per errno, for scans and for ranging.
 
 Measured on real kernels (6.1, 6.12) where the kernel tier's jobs meet them; the rest is from their source.
 """
@@ -28,7 +28,7 @@ CAPABILITY = (
 )
 STUCK = (
     "its firmware is stuck: reload the driver (`modprobe -r {driver} && modprobe {driver}`) or restart the machine; "
-    "`dmesg` tells more"
+    "`dmesg` has more"
 )
 
 PASSING = frozenset({errno.EAGAIN, errno.ENOBUFS, errno.ENOMEM, errno.EINTR})
@@ -38,7 +38,7 @@ FIRMWARE = frozenset({errno.EIO, errno.ETIMEDOUT})
 
 
 class Row(NamedTuple):
-    """One errno: the error, what is said, and the hint, with the places {interface}, {wish} and {driver}."""
+    """One errno: the error, its text, and the hint, with the places {interface}, {wish} and {driver}."""
 
     kind: type[DriverError]
     what: str
@@ -63,7 +63,7 @@ REFUSALS: dict[int, Row] = {
     errno.ENOENT: Row(UnsupportedError, "this kernel has no Wi-Fi (nl80211)", "load the driver of a Wi-Fi radio"),
 }
 
-UNKNOWN = Row(DeviceLostError, "{interface}: {wish}: {code}", "`dmesg` may tell why")
+UNKNOWN = Row(DeviceLostError, "{interface}: {wish}: {code}", "`dmesg` may have the reason")
 
 
 def refused(refusal: OSError, interface: str, wish: str, driver: str = "") -> DriverError:
@@ -73,7 +73,7 @@ def refused(refusal: OSError, interface: str, wish: str, driver: str = "") -> Dr
     places = {"interface": interface, "wish": wish, "driver": driver or "its_module"}
     places["code"] = f"{os.strerror(code)} ({errno.errorcode.get(code, code)})"
     words = refusal.strerror or ""
-    added = f" (the kernel says: {words})" if words not in ("", os.strerror(code)) else ""
+    added = f" (the kernel: {words})" if words not in ("", os.strerror(code)) else ""
     return row.kind(row.what.format(**places) + added, row.hint.format(**places))
 
 

@@ -1,4 +1,4 @@
-"""Fine timing measurement, Wi-Fi's round-trip time, as nl80211 speaks it: what is asked, what is answered; pure.
+"""Fine timing measurement, Wi-Fi's round-trip time, in nl80211: requests and answers; pure.
 
 A range is c/2 times the round-trip time. Time is in picoseconds, distance in millimetres, both signed: a near peer may
 come out behind the antenna, and stays so here.
@@ -23,7 +23,7 @@ PREAMBLES = {20: HT, 40: HT, 80: VHT}
 
 @unique
 class Status(IntEnum):
-    """How an attempt ended: nl80211_peer_measurement_status."""
+    """Status of an attempt: nl80211_peer_measurement_status."""
 
     SUCCESS = 0
     REFUSED = 1
@@ -32,8 +32,8 @@ class Status(IntEnum):
 
 
 class Attempt(NamedTuple):
-    """One peer's answer. ``range_m``, ``std_m`` and ``rssi_dbm`` are None where the device tells none; ``time_ns`` is
-    the host's boot time of the answer, None where it is not told.
+    """One peer's answer. ``range_m``, ``std_m`` and ``rssi_dbm`` are None where the device reports none; ``time_ns``
+    is the host's boot time of the answer, None where it is not reported.
     """
 
     bssid: str
@@ -63,9 +63,9 @@ def _asked(peer: Peer) -> Attributes:
     return {"ADDR": bytes.fromhex(peer.bssid.replace(":", "")), "CHAN": channel, "REQ": {"DATA": {"FTM": how}}}
 
 
-def read_attempts(told: Attributes) -> list[Attempt]:
-    """The answers in one result; one without an address or a status says nothing."""
-    peers: Iterable[Attributes] = told.get("PEER_MEASUREMENTS", {}).get("PEERS", ())
+def read_attempts(result: Attributes) -> list[Attempt]:
+    """The answers in one result; one without an address or a status is left out."""
+    peers: Iterable[Attributes] = result.get("PEER_MEASUREMENTS", {}).get("PEERS", ())
     return [
         _read_one(peer["ADDR"], peer["RESP"]) for peer in peers if "STATUS" in peer.get("RESP", {}) and "ADDR" in peer
     ]

@@ -1,4 +1,4 @@
-"""The Wi-Fi interfaces of this machine and what they say of themselves; needs no rights."""
+"""The Wi-Fi interfaces of this machine and their own descriptions; needs no rights."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Interface(NamedTuple):
 
     @property
     def state(self) -> str:
-        """Whether it is up or down, in the kernel's words; empty where it says nothing."""
+        """Whether it is up or down, in the kernel's words; empty where it has none."""
         with suppress(OSError):
             return (NETWORK / self.name / "operstate").read_text().strip()
         return ""
@@ -40,7 +40,7 @@ class Interface(NamedTuple):
 
 def interfaces(nl80211: Nl80211) -> list[Interface]:
     """All of them, by name; raises `OSError`."""
-    found = [told.attributes for told in nl80211.ask(Command.GET_INTERFACE, {}, dump=True)]
+    found = [message.attributes for message in nl80211.ask(Command.GET_INTERFACE, {}, dump=True)]
     return sorted(
         Interface(one["IFNAME"], one["IFINDEX"], one.get("WIPHY", 0), one.get("MAC", b"").hex(":"))
         for one in found
@@ -59,7 +59,7 @@ def look_up(nl80211: Nl80211, name: str) -> Interface:
 def with_radio(nl80211: Nl80211, interface: Interface) -> Interface:
     """The interface with what its radio offers; a radio's description comes in many parts."""
     asked: Attributes = {"WIPHY": interface.wiphy, "SPLIT_WIPHY_DUMP": True}
-    parts = [told.attributes for told in nl80211.ask(Command.GET_WIPHY, asked, dump=True)]
+    parts = [message.attributes for message in nl80211.ask(Command.GET_WIPHY, asked, dump=True)]
     offered = {
         channel["FREQ"]
         for part in parts
@@ -72,10 +72,10 @@ def with_radio(nl80211: Nl80211, interface: Interface) -> Interface:
 
 
 def power_save(nl80211: Nl80211, interface: Interface) -> str:
-    """Whether the radio sleeps between beacons: on, off, or unknown where the driver does not tell."""
+    """Whether the radio sleeps between beacons: on, off, or unknown where the driver does not report it."""
     with suppress(OSError):
-        (told,) = nl80211.ask(Command.GET_POWER_SAVE, {"IFINDEX": interface.number})
-        return POWER_SAVE.get(told.attributes.get("PS_STATE", -1), "unknown")
+        (answer,) = nl80211.ask(Command.GET_POWER_SAVE, {"IFINDEX": interface.number})
+        return POWER_SAVE.get(answer.attributes.get("PS_STATE", -1), "unknown")
     return "unknown"
 
 

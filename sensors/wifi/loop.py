@@ -1,7 +1,7 @@
-"""What scanning and ranging share: small steps over the kernel's events, and an end to trying where it is no use.
+"""Base of the scan loop and the ranging loop: small steps over the kernel's events, and an end to hopeless tries.
 
 A loop waits for one thing at a time, never longer than a poll is given, and for nothing longer than a limit. What goes
-wrong once is told and tried again a little later; a radio that fails several times in a row needs a person.
+wrong once is reported and tried again a little later; a radio that fails several times in a row needs a person.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ FAILURES_TO_STUCK = 3
 
 
 class Trouble(NamedTuple):
-    """What went wrong once; the loop goes on."""
+    """A single failure; the loop goes on."""
 
     text: str
 
 
 Result = TypeVar("Result")
-"""What comes of a scan or a round of ranging."""
+"""Result of a scan or a round of ranging."""
 
 
 class Loop(ABC, Generic[Result]):
@@ -40,19 +40,19 @@ class Loop(ABC, Generic[Result]):
         self._clock, self._nl80211, self._interface = clock, nl80211, interface
         self._due_ns = clock.now_ns()
         self._failures = 0
-        self._untold: Result | Trouble | None = None
+        self._pending: Result | Trouble | None = None
 
     def start(self) -> None:
         """Ask for the first result, so that what the kernel refuses shows at once."""
         try:
             self._begin()
         except OSError as error:
-            self._untold = self._refused(error)
+            self._pending = self._refused(error)
 
     def poll(self, timeout_s: float) -> Result | Trouble | None:
         """A result, or what went wrong, if there is one within the time given."""
         until_ns = self._clock.now_ns() + nanoseconds(timeout_s)
-        outcome, self._untold = self._untold, None
+        outcome, self._pending = self._pending, None
         while outcome is None:
             try:
                 outcome = self._step(until_ns)
@@ -74,7 +74,7 @@ class Loop(ABC, Generic[Result]):
 
     @abstractmethod
     def _refused(self, refusal: OSError) -> Trouble | None:
-        """Heed the kernel's refusal, or raise what the keeper or a person must see to."""
+        """Heed the kernel's refusal, or raise what the lifecycle or a person must see to."""
 
     @abstractmethod
     def _drop(self) -> None:

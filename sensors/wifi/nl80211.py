@@ -1,7 +1,7 @@
 """A way to nl80211: requests that are answered, and events in between, over anything that carries datagrams.
 
 The kernel's own is a plain netlink socket. pyroute2's is not used: it drains several datagrams at once into a queue of
-its own, so that polling its descriptor says nothing of the rest.
+its own, so that polling its descriptor misses the rest.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ DATAGRAM = 1 << 16
 
 
 class Transport(Protocol):
-    """What carries datagrams to nl80211 and back; every method may raise `OSError`."""
+    """Carrier of datagrams to nl80211 and back; every method may raise `OSError`."""
 
     def open(self, groups: Sequence[str]) -> int:
         """Join the multicast groups; the number of the family nl80211. ENOENT: this kernel has no Wi-Fi."""
@@ -130,7 +130,7 @@ class Nl80211:
         self._family = self._sequence = 0
 
     def open(self, *groups: str) -> None:
-        """Begin to hear the events of the multicast ``groups``; raises `OSError`."""
+        """Join the events of the multicast ``groups``; raises `OSError`."""
         self._events.clear()
         self._family = self._transport.open(groups)
 
@@ -162,7 +162,7 @@ class Nl80211:
                     return [*answers, message] if message.attributes else answers
 
     def event(self, timeout_s: float) -> Message | None:
-        """The next thing the kernel tells unasked, None if nothing came in time; raises `ProtocolError`."""
+        """The next event of the kernel, None if none came in time; raises `ProtocolError`."""
         if not self._events:
             try:
                 for message in self._receive(timeout_s):

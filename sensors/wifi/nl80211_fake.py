@@ -24,14 +24,14 @@ FLUSH = 2
 CHANNELS_MHZ = (*range(2412, 2473, 5), 5180, 5200)
 BURST_NS = nanoseconds(0.03)
 TIMED_OUT = 2
-"""Status of a ranging request that nobody answered."""
+"""Status of a ranging request without an answer."""
 LIGHT_M_PER_S = 299_792_458.0
 NONSENSE = b"\x18\x00\x00\x00\x1c\x00\x00\x00 this is no message"
 
 
 @dataclass
 class AccessPoint:
-    """One anchor: what is heard of it. ``range_m`` None: it answers no ranging request."""
+    """One anchor as it is received. ``range_m`` None: it answers no ranging request."""
 
     ssid: str
     frequency_mhz: int
@@ -59,7 +59,7 @@ class FakeKernel:
     refusals: dict[Command, int] = field(default_factory=dict)
     """An errno for a command; 0 lifts it."""
     end: Command | None = Command.NEW_SCAN_RESULTS
-    """How scans end; None: never."""
+    """Event that ends scans; None: never."""
     dwell_s: float = 0.1
     """Time on one channel."""
     stamps_at_end: bool = False
@@ -79,8 +79,8 @@ class FakeKernel:
 
     # -- the transport
 
-    def open(self, groups: Sequence[str]) -> int:  # noqa: ARG002 - every group is heard
-        """As a socket that is opened: what was told before is not heard."""
+    def open(self, groups: Sequence[str]) -> int:  # noqa: ARG002 - every group is joined
+        """As a socket that is opened: earlier events are not received."""
         self._waiting = [one for one in self._waiting if one[0] > self.clock.now_ns()]
         heapq.heapify(self._waiting)
         return FAMILY
@@ -92,7 +92,7 @@ class FakeKernel:
             self._serve(message)
 
     def receive(self, timeout_s: float) -> bytes | None:
-        """What falls due within the time; the clock moves there."""
+        """The next datagram that is due within the time; the clock moves there."""
         until_ns = self.clock.now_ns() + nanoseconds(timeout_s)
         due_ns = max(self._waiting[0][0], self.clock.now_ns()) if self._waiting else until_ns + 1
         self.clock.sleep(seconds(min(due_ns, until_ns) - self.clock.now_ns()))
@@ -109,12 +109,12 @@ class FakeKernel:
         """Another program scans, without flushing; ``is_seen`` False: its beginning was before anybody joined."""
         self._scan(frequencies_mhz, index, is_seen=is_seen)
 
-    def say(self, data: bytes) -> None:
-        """Let these bytes be heard at once."""
-        self._say(data, self.clock.now_ns())
+    def emit(self, data: bytes) -> None:
+        """Send these bytes at once."""
+        self._schedule(data, self.clock.now_ns())
 
     def unplug(self) -> None:
-        """The interface is gone, and what it would have said."""
+        """The interface is gone, and its pending events."""
         self.is_there = False
         self._waiting.clear()
         self._busy_until_ns = 0
@@ -135,13 +135,13 @@ class FakeKernel:
             self._check(message)
             answers = serve[message.command](message)
         except OSError as error:
-            self.say(encode_end(error.errno or 0, message.sequence, {"MSG": error.strerror}))
+            self.emit(encode_end(error.errno or 0, message.sequence, {"MSG": error.strerror}))
             return
         end = answers.pop() if answers and "COOKIE" in answers[-1] else None
         for answer in answers:
             command = ANSWERS.get(Command(message.command), message.command)
-            self.say(encode(Message(command, answer, message.sequence, MULTIPART), FAMILY))
-        self.say(encode_end(0, message.sequence, end, dump=is_dump))
+            self.emit(encode(Message(command, answer, message.sequence, MULTIPART), FAMILY))
+        self.emit(encode_end(0, message.sequence, end, dump=is_dump))
 
     def _check(self, message: Message) -> None:
         if message.attributes.get("IFINDEX", INDEX) != INDEX or (not self.is_there and "IFINDEX" in message.attributes):
@@ -181,21 +181,23 @@ class FakeKernel:
         done_ns = began_ns + dwell_ns * len(frequencies_mhz)
         about: Attributes = {"WIPHY": WIPHY, "IFINDEX": index}
         if is_seen:
-            self._say(encode(Message(Command.TRIGGER_SCAN, about), FAMILY), began_ns)
+            self._schedule(encode(Message(Command.TRIGGER_SCAN, about), FAMILY), began_ns)
         if self.end is None:
             self._busy_until_ns = 1 << 62
             return
         self._busy_until_ns = done_ns
-        self._say(encode(Message(self.end, about), FAMILY), done_ns)
+        self._schedule(encode(Message(self.end, about), FAMILY), done_ns)
         for place, frequency in enumerate(frequencies_mhz):
             seen_ns = done_ns if self.stamps_at_end else began_ns + dwell_ns * place + dwell_ns // 2
-            heard = {k: (replace(ap), seen_ns) for k, ap in self.access_points.items() if ap.frequency_mhz == frequency}
-            self._cache.update(heard)
+            received = {
+                k: (replace(ap), seen_ns) for k, ap in self.access_points.items() if ap.frequency_mhz == frequency
+            }
+            self._cache.update(received)
 
     def _listed(self) -> list[Attributes]:
         now_ns = self.clock.now_ns()
-        heard = {bssid: entry for bssid, entry in self._cache.items() if entry[1] <= now_ns}
-        return [{"IFINDEX": INDEX, "BSS": self._bss(bssid, *entry)} for bssid, entry in heard.items()]
+        listed = {bssid: entry for bssid, entry in self._cache.items() if entry[1] <= now_ns}
+        return [{"IFINDEX": INDEX, "BSS": self._bss(bssid, *entry)} for bssid, entry in listed.items()]
 
     def _bss(self, bssid: str, ap: AccessPoint, seen_ns: int) -> Attributes:
         name = ap.ssid.encode()
@@ -216,10 +218,10 @@ class FakeKernel:
         about: Attributes = {"WIPHY": WIPHY, "IFINDEX": INDEX, "COOKIE": message.sequence}
         for peer in message.attributes["PEER_MEASUREMENTS"]["PEERS"]:
             at_ns += BURST_NS
-            told: Attributes = {"PEER_MEASUREMENTS": {"PEERS": [self._range(peer["ADDR"], at_ns)]}}
-            self._say(encode(Message(Command.PEER_MEASUREMENT_RESULT, about | told), FAMILY), at_ns)
+            result: Attributes = {"PEER_MEASUREMENTS": {"PEERS": [self._range(peer["ADDR"], at_ns)]}}
+            self._schedule(encode(Message(Command.PEER_MEASUREMENT_RESULT, about | result), FAMILY), at_ns)
         if self.end is not None:
-            self._say(encode(Message(Command.PEER_MEASUREMENT_COMPLETE, about), FAMILY), at_ns)
+            self._schedule(encode(Message(Command.PEER_MEASUREMENT_COMPLETE, about), FAMILY), at_ns)
         return [{"COOKIE": message.sequence}]
 
     def _range(self, address: bytes, at_ns: int) -> Attributes:
@@ -238,7 +240,7 @@ class FakeKernel:
             "RESP": {"DATA": {"FTM": measured}, "STATUS": 0, "HOST_TIME": at_ns, "FINAL": True},
         }
 
-    def _say(self, data: bytes, due_ns: int) -> None:
+    def _schedule(self, data: bytes, due_ns: int) -> None:
         self._count += 1
         heapq.heappush(self._waiting, (due_ns, self._count, data))
 
@@ -263,11 +265,11 @@ class FakeWifi:
         self.settings: Mapping[str, object] = MappingProxyType({"device": self.kernel, **settings})
 
     def speak(self) -> None:
-        """Nothing to do: whoever scans, hears."""
+        """Nothing to do: the access points always send."""
 
     def garble(self) -> None:
-        """Let it say something that nobody understands."""
-        self.kernel.say(NONSENSE)
+        """Send bytes that cannot be parsed."""
+        self.kernel.emit(NONSENSE)
 
     def unplug(self) -> None:
         """Take it away."""

@@ -31,7 +31,7 @@ LEAST_ATTRIBUTE = 4
 
 @unique
 class Command(IntEnum):
-    """What is asked for, or told."""
+    """Requests and events."""
 
     GET_WIPHY = 1
     NEW_WIPHY = 3
@@ -118,7 +118,7 @@ ACKNOWLEDGEMENT: Rows = ((1, "MSG", "asciiz"), (3, "COOKIE", "uint64"))
 
 
 class Message(NamedTuple):
-    """One message. ``errno``: None but in an answer's end, which says 0 or why the kernel refused."""
+    """One message. ``errno``: None but in an answer's end, with 0 or the reason of the refusal."""
 
     command: int
     attributes: Attributes
@@ -182,7 +182,7 @@ def _decode_one(data: bytes, kind: int, flags: int, sequence: int) -> Message:
 
 def _nonsense(why: str) -> ProtocolError:
     return ProtocolError(
-        f"the kernel's nl80211 said what cannot be read: {why}", "update the kernel's Wi-Fi driver, or report it"
+        f"the kernel's nl80211 sent what cannot be read: {why}", "update the kernel's Wi-Fi driver, or report it"
     )
 
 

@@ -1,4 +1,4 @@
-"""The ranging loop of one interface: ask all peers, gather their answers, until the kernel says that it is done."""
+"""The ranging loop of one interface: ask all peers, gather their answers, until the kernel reports its end."""
 
 from __future__ import annotations
 

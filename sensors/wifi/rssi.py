@@ -1,6 +1,6 @@
 """Wi-Fi signal strengths by scanning chosen channels, or by listening to the scans of other programs.
 
-The work is done by `sensors.wifi.scanner`; what a scan comes to is told by `sensors.wifi.report`.
+The work is done by `sensors.wifi.scanner`; `sensors.wifi.report` makes the outputs of a scan.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sensors.wifi.settings import USUAL_MHZ, WifiSettings, read_wifi_settings
 SHORTEST_S = 0.4
 """Three channels, passively, on simulated radios; no round is expected to be shorter."""
 LEAST_HZ = 0.2
-"""A round may take up to twelve seconds before it is given up, and that is told: silence must be longer."""
+"""A round may take up to twelve seconds before it is given up, and that is reported: silence must be longer."""
 
 
 class Wifi(WifiDriver[Scan]):
@@ -49,7 +49,7 @@ class Wifi(WifiDriver[Scan]):
         stamp: str = "auto",
         device: Transport | None = None,
     ) -> None:
-        """`sensors.wifi.settings` says what each is; ``device`` stands in for the kernel."""
+        """`sensors.wifi.settings` describes each; ``device`` stands in for the kernel."""
         given = {"interface": interface, "frequencies_mhz": frequencies_mhz, "names": names, "only_named": only_named}
         given |= {"mode": mode, "per_channel": per_channel, "or_listen": or_listen, "period_s": period_s}
         self._settings = read_wifi_settings(name, given | {"stamp": stamp})
@@ -59,7 +59,7 @@ class Wifi(WifiDriver[Scan]):
 
     @property
     def spec(self) -> DriverSpec:
-        """How often to expect a scan; those of others come when they come."""
+        """Expected rate of scans; those of other programs have none."""
         settings = self._settings
         if self._listens():
             return DriverSpec((WifiScan,), 0.0, 0.0, Needs(modules=("pyroute2",)))
@@ -101,8 +101,8 @@ class Wifi(WifiDriver[Scan]):
             "power_save": power_save(nl80211, interface),
         }
 
-    def _told(self, result: Scan) -> list[DriverOutput]:
-        return self._report.tell(result, listens=self._listens())
+    def _outputs(self, result: Scan) -> list[DriverOutput]:
+        return self._report.outputs(result, listens=self._listens())
 
 
 def _plan(settings: WifiSettings) -> Plan:
@@ -113,7 +113,7 @@ def _plan(settings: WifiSettings) -> Plan:
 
 
 def _require_channels(interface: Interface, wanted: Sequence[int]) -> None:
-    """The kernel would only say that something is wrong."""
+    """Refuse channels that the radio does not have by name, which the kernel would not."""
     offered = interface.frequencies_mhz
     for channel in wanted:
         if offered and channel not in offered:

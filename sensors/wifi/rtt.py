@@ -1,6 +1,6 @@
 """Ranges by Wi-Fi round-trip time (FTM), where the radio and its driver offer it: nl80211's peer measurements.
 
-Few radios initiate them, and a Raspberry Pi's does not; peers must respond. Every attempt is told with its status.
+Few radios initiate them, and a Raspberry Pi's does not; peers must respond. Every attempt is reported with its status.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class WifiRtt(WifiDriver[Round]):
         period_s: float = 1.0,
         device: Transport | None = None,
     ) -> None:
-        """`sensors.wifi.settings.Peer` says what each of ``peers`` has; ``device`` stands in for the kernel."""
+        """`sensors.wifi.settings.Peer` describes the keys of ``peers``; ``device`` stands in for the kernel."""
         self._settings = read_rtt_settings(name, {"peers": peers, "interface": interface, "period_s": period_s})
         super().__init__(name, clock, interface, device)
         self._anchors = {peer.bssid: peer.anchor for peer in self._settings.peers}
@@ -83,8 +83,8 @@ class WifiRtt(WifiDriver[Round]):
         peers = {peer.anchor: f"{peer.bssid} {peer.frequency_mhz} MHz" for peer in self._settings.peers}
         return {"interface": interface.name, "peers": peers, "offers": dict(interface.ftm or {})}
 
-    def _told(self, result: Round) -> list[DriverOutput]:
-        """The ranges that were measured, and how each attempt ended."""
+    def _outputs(self, result: Round) -> list[DriverOutput]:
+        """The ranges that were measured, and the status of each attempt."""
         attempts = [one for one in result.attempts if one.bssid in self._anchors]
         readings = [
             RangeReading(self._anchors[one.bssid], one.range_m, one.std_m)
@@ -95,9 +95,9 @@ class WifiRtt(WifiDriver[Round]):
         diagnostic = self._diagnostic(attempts, len(readings), result.done_ns)
         if not readings:
             return [diagnostic]
-        told_ns = (one.time_ns for one in attempts if one.time_ns is not None and one.time_ns <= result.done_ns)
-        self._seq += 1
-        return [Ranges(max(told_ns, default=result.done_ns), self._name, self._seq - 1, tuple(readings)), diagnostic]
+        answered_ns = (one.time_ns for one in attempts if one.time_ns is not None and one.time_ns <= result.done_ns)
+        time_ns, self._seq = max(answered_ns, default=result.done_ns), self._seq + 1
+        return [Ranges(time_ns, self._name, self._seq - 1, tuple(readings)), diagnostic]
 
     def _diagnostic(self, attempts: list[Attempt], measured: int, done_ns: int) -> Diagnostic:
         values = [("round", str(self._rounds - 1)), *((self._anchors[one.bssid], _in_words(one)) for one in attempts)]

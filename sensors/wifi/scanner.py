@@ -1,11 +1,11 @@
 """The scan loop of one interface.
 
-    IDLE ──trigger──→ ASKED ──the kernel tells that it begins──→ SCANNING ──its end──→ IDLE
+    IDLE ──trigger──→ ASKED ──event of its beginning──→ SCANNING ──its end──→ IDLE
       └───EBUSY────→ FOREIGN ──────────────── its end ─────────────────────────────→ IDLE
     LISTENING: for ever, where we trigger nothing.
 
 An end counts only after its beginning, so the end of somebody's earlier scan is never taken for ours. While another's
-scan runs we do not ask again: we wait for its end and use what it heard.
+scan runs we do not ask again: we wait for its end and use its entries.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sensors.wifi.interface import Interface
 from sensors.wifi.loop import LIMIT_NS, Loop, Trouble
 from sensors.wifi.nl80211 import Nl80211
 from sensors.wifi.nl80211_message import Command, Message
-from sensors.wifi.reading import Part, Window, fresh, read_heard
+from sensors.wifi.reading import Part, Window, fresh, read_entries
 
 GIVEN_UP_NS = nanoseconds(9.0)
 """A scan that is aborted so late was given up by the firmware's own watchdog."""
@@ -32,7 +32,7 @@ ENDS = (Command.NEW_SCAN_RESULTS, Command.SCAN_ABORTED)
 
 @unique
 class Phase(Enum):
-    """What the radio does, as far as we know."""
+    """State of the radio, as far as known."""
 
     IDLE = "idle"
     ASKED = "asked"
@@ -42,7 +42,7 @@ class Phase(Enum):
 
 
 class Plan(NamedTuple):
-    """What to scan: one round is a scan of each group of channels in turn, rounds begin ``period_ns`` apart."""
+    """Plan of the scans: one round is a scan of each group of channels in turn, rounds begin ``period_ns`` apart."""
 
     groups: tuple[tuple[int, ...], ...]
     is_active: bool
@@ -159,12 +159,12 @@ class Scanner(Loop[Scan]):
         self._phase, self._failures = self._rest(), 0
         listed = self._nl80211.ask(Command.GET_SCAN, {"IFINDEX": self._interface.number}, dump=True)
         now_ns = self._clock.now_ns()
-        part = fresh(read_heard(listed, now_ns), window, now_ns)
+        part = fresh(read_entries(listed, now_ns), window, now_ns)
         return self._scanned(part) if phase is Phase.SCANNING else Scan((part,), is_ours=False)
 
     def _aborted(self, took_ns: int, phase: Phase) -> Trouble:
         """The kernel does not flush for a scan that is aborted: nothing of its list can be trusted."""
-        what = f"a scan was aborted after {seconds(took_ns):.1f} s; what it heard is not used"
+        what = f"a scan was aborted after {seconds(took_ns):.1f} s; its readings are not used"
         given_up = phase is Phase.SCANNING and took_ns >= GIVEN_UP_NS
         return self._failed(what) if given_up else self._later(what)
 

@@ -1,4 +1,4 @@
-"""What the Wi-Fi drivers may be told, checked before any device is touched."""
+"""Settings of the Wi-Fi drivers, checked before any device is touched."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Peer:
 
     @property
     def anchor(self) -> str:
-        """What the anchor goes by."""
+        """Name of the anchor."""
         return self.name or self.bssid
 
 

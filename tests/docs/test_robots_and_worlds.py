@@ -18,7 +18,7 @@ from fusion.plugins import SENSORS
 from logs.reader import read_run
 from sensors.cli import doctor
 from sensors.onboard.robot_file import RobotFile, Sensor, build_driver
-from sensors.onboard.sensor_loop import Sensing
+from sensors.onboard.sensor_loop import SensorLoop
 from sensors.simulation.scenario import Scenario
 from sensors.simulation.simulate import simulated_run
 from tests.sensors.virtual_drive import virtual_drive
@@ -97,7 +97,7 @@ def test_every_toml_text_of_the_docs_is_of_a_kind_that_is_tried():
 @pytest.mark.parametrize("text", of_kind("sensors", whole=True))
 def test_robot_file_of_the_docs_records_what_an_estimator_can_use(text, tmp_path):
     robot = robot_file(tmp_path, text)
-    assert Sensing(robot).warning == ""
+    assert SensorLoop(robot).warning == ""
     names = {sensor.name for sensor in robot.sensors}
     found = [advice for advice in doctor.examine(robot, tmp_path) if advice.what.split(":")[0] in names]
     assert len(found) == 2 * len(names)
@@ -132,7 +132,7 @@ def parts():
 @pytest.mark.parametrize("text", [pytest.param(text, id=name) for text, name in parts()])
 def test_sensors_on_the_page_of_a_driver_measure_on_the_stand_in_for_their_device(text, tmp_path):
     robot = robot_file(tmp_path, text)
-    Sensing(robot)
+    SensorLoop(robot)
     for sensor in robot.sensors:
         with fusion.load(sensor.use, SENSORS).fake() as device:
             places = {key: value for key, value in device.settings.items() if key in PLACES}

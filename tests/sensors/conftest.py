@@ -1,4 +1,4 @@
-"""A robot for tests: the simulated one, in a small room."""
+"""Robots for tests: the simulated one in a small room, and drives of one whose calibration is known."""
 
 import subprocess
 import sys
@@ -7,6 +7,7 @@ import pytest
 
 from sensors.onboard.robot_file import RobotFile
 from tests.sensors.robot_files import robot_text
+from tests.sensors.simulated_drive import simulated_drive
 
 
 @pytest.fixture
@@ -46,3 +47,9 @@ def start_recording(robot_file, tmp_path):
     for process in processes:
         process.kill()
         process.communicate()
+
+
+@pytest.fixture(scope="session")
+def drive():
+    """A simulated drive of lines, spins and squares in both senses; noise by keyword."""
+    return simulated_drive

@@ -1,4 +1,4 @@
-"""Drivers of UWB modules over real USB, kept by their keeper while the cable is pulled out and put in again."""
+"""Drivers of UWB modules over real USB, run by their lifecycle while the cable is pulled out and put in again."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from fusion import BootClock, Diagnostic, DriverOutput, NotFoundError, Ranges
 from kernel.guest.serial import NEAR, Module, UsbSerial
-from sensors.onboard.driver_lifecycle import Keeper
+from sensors.onboard.driver_lifecycle import DriverLifecycle
 from sensors.uwb.dwm1001 import FakeShell, UwbDwm1001
 from sensors.uwb.fake_serial import Mute, Talker
 from sensors.uwb.lines import UwbLines
@@ -34,32 +34,34 @@ def run(line: str, dwm1001: str) -> dict[str, Any]:
 
 def story(usb: UsbSerial, driver: SerialRanging, firmware: Callable[[], Talker], line: str) -> dict[str, Any]:
     """Ranges, the cable pulled out until a try to open the port has failed, ranges again."""
-    keeper = Keeper("uwb", driver, BootClock())
+    lifecycle = DriverLifecycle("uwb", driver, BootClock())
     usb.plug()
     with Module(firmware(), line):
-        said = turn_until(keeper, lambda said: len(ranges(said)) == ENOUGH)
+        outputs = step_until(lifecycle, lambda outputs: len(ranges(outputs)) == ENOUGH)
     usb.unplug()
-    said += turn_until(keeper, lambda _: isinstance(keeper.error, NotFoundError))
+    outputs += step_until(lifecycle, lambda _: isinstance(lifecycle.error, NotFoundError))
     usb.plug()
     with Module(firmware(), line):
-        said += turn_until(keeper, lambda said: len(ranges(said)) == ENOUGH)
+        outputs += step_until(lifecycle, lambda outputs: len(ranges(outputs)) == ENOUGH)
         found = [found.id for found in driver.discover()]
-        keeper.close()
+        lifecycle.close()
     usb.unplug()
     diagnostics = [
-        [one.level.name, one.text] for one in said if isinstance(one, Diagnostic) and dict(one.values).get("state")
+        [one.level.name, one.text] for one in outputs if isinstance(one, Diagnostic) and dict(one.values).get("state")
     ]
-    return {"ranges": ranges(said), "diagnostics": diagnostics, "losses": keeper.losses, "found": found}
+    return {"ranges": ranges(outputs), "diagnostics": diagnostics, "losses": lifecycle.losses, "found": found}
 
 
-def turn_until(keeper: Keeper, holds: Callable[[list[DriverOutput]], bool]) -> list[DriverOutput]:
-    """What the keeper hears until `holds` is true of it."""
-    said: list[DriverOutput] = []
-    while not holds(said):
-        said += [received.said for received in keeper.turn(0.1)]
-    return said
+def step_until(lifecycle: DriverLifecycle, holds: Callable[[list[DriverOutput]], bool]) -> list[DriverOutput]:
+    """Outputs of the driver until `holds` is true of them."""
+    outputs: list[DriverOutput] = []
+    while not holds(outputs):
+        outputs += [received.output for received in lifecycle.step(0.1)]
+    return outputs
 
 
-def ranges(said: list[DriverOutput]) -> list[list[tuple[str, float]]]:
+def ranges(outputs: list[DriverOutput]) -> list[list[tuple[str, float]]]:
     """Anchor and metres of each message."""
-    return [[(reading.anchor, reading.range_m) for reading in one.readings] for one in said if isinstance(one, Ranges)]
+    return [
+        [(reading.anchor, reading.range_m) for reading in one.readings] for one in outputs if isinstance(one, Ranges)
+    ]

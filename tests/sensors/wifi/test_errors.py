@@ -20,7 +20,7 @@ def test_every_refusal_is_told_whole(code):
     error = refusal(code)
     assert error.hint
     assert "{" not in str(error), "a place that was not filled"
-    assert "the kernel says" not in error.what, "nothing new"
+    assert "(the kernel:" not in error.what, "nothing new"
 
 
 def test_what_passes_and_what_needs_a_person():
@@ -33,7 +33,7 @@ def test_what_passes_and_what_needs_a_person():
 
 def test_the_kernel_s_own_words_are_passed_on():
     error = refusal(errno.EINVAL, "FTMs per burst must be set lower than the device limit but non-zero")
-    assert "the kernel says: FTMs per burst" in error.what
+    assert "(the kernel: FTMs per burst" in error.what
 
 
 def test_the_names_in_the_hints_are_those_of_the_device():

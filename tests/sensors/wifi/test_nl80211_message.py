@@ -21,7 +21,7 @@ from sensors.wifi.nl80211_message import (
     encode,
     encode_end,
 )
-from sensors.wifi.reading import read_heard
+from sensors.wifi.reading import read_entries
 
 SCAN_TRIGGER = Message(
     Command.TRIGGER_SCAN,
@@ -121,7 +121,7 @@ def test_a_damaged_message_is_a_message_or_a_protocol_error(message, data):
     for one in (damaged, cut):
         with suppress(ProtocolError):
             messages = decode(bytes(one))
-            read_heard(messages, 10**12)
+            read_entries(messages, 10**12)
             [read_attempts(message.attributes) for message in messages]
 
 

@@ -1,31 +1,16 @@
 """The simulated robot sends what a real one would, and the same for the same seed."""
 
-import itertools
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from fusion import (
-    Gyro,
-    Increment,
-    LogError,
-    MotorCommand,
-    ParameterError,
-    Pose,
-    Ranges,
-    Truth,
-    WheelTicks,
-    WifiScan,
-    WorldError,
-)
+from fusion import Gyro, Increment, MotorCommand, Pose, Ranges, Truth, WheelTicks, WifiScan
 from fusion.odometry import Odometer
-from logs.reader import read_run
 from sensors.simulation.robot import SimulatedRobot
 from sensors.simulation.route import drive
-from sensors.simulation.scenario import builtin_names, load_scenario
-from sensors.simulation.simulate import simulate, simulated_run
+from sensors.simulation.scenario import load_scenario
 
 NO_ERRORS = dict.fromkeys(
     [
@@ -45,12 +30,6 @@ NO_ERRORS = dict.fromkeys(
 )
 FINE = 1_000_000
 """Ticks a revolution at which rounding to whole ticks no longer matters."""
-SCENARIO = """
-[world]
-bounds = {x_min = -1.0, x_max = 9.0, y_min = -1.0, y_max = 9.0}
-[route]
-waypoints_m = [[0.0, 0.0], [2.0, 0.0]]
-"""
 
 
 def with_robot(scenario, **changes):
@@ -88,65 +67,6 @@ def dead_reckoned(scenario, seed=0):
 
 def said_by(scenario, kind, seed=0):
     return [message for message in SimulatedRobot(scenario, seed).run() if isinstance(message, kind)]
-
-
-def crosses(a, b, c, d):
-    """Whether the segments a-b and c-d touch, by solving for the point where they meet."""
-    directions = np.array([np.subtract(b, a), np.subtract(c, d)]).T
-    if abs(np.linalg.det(directions)) < 1e-12:
-        return False
-    along = np.linalg.solve(directions, np.subtract(c, a))
-    return bool(np.all(along >= 0.0) and np.all(along <= 1.0))
-
-
-def test_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path):
-    first, again, other = (
-        simulate("office", tmp_path / f"{name}.mcap", seed=seed, duration_s=20.0).read_bytes()
-        for name, seed in (("first", 1), ("again", 1), ("other", 2))
-    )
-    assert first == again
-    assert first != other
-
-
-def test_log_says_what_the_robot_said(tmp_path):
-    scenario = load_scenario("mec")
-    run = read_run(simulate("mec", tmp_path / "mec.mcap", seed=4, duration_s=10.0))
-    said = [message for message in SimulatedRobot(scenario, 4).run() if message.time_ns <= 10_000_000_000]
-    assert run.measurements == tuple(message for message in said if not isinstance(message, Truth))
-    assert len(run.truth) == sum(isinstance(message, Truth) for message in said)
-    assert run.world == scenario.world
-    assert run.measurements[-1].time_ns <= 10_000_000_000
-
-
-def test_builtin_scenarios_are_the_three_of_the_paper_at_its_exponents_and_band():
-    names = [name for name in builtin_names() if name.removeprefix("paper_") in ("office", "mec", "arena")]
-    assert len(names) == 6
-    for name in names:
-        exponent = {"office": 2.27, "mec": 2.13, "arena": 1.71}[name.removeprefix("paper_")]
-        anchors = load_scenario(name).world.anchors
-        assert len(anchors) == 3
-        assert {anchor.radio.path_loss_exponent for anchor in anchors} == {exponent}
-        assert all(2.4e9 < anchor.radio.frequency_hz < 2.5e9 for anchor in anchors)
-
-
-@pytest.mark.parametrize("name", builtin_names())
-def test_builtin_route_stays_on_the_floor_and_goes_through_no_wall(name):
-    scenario = load_scenario(name)
-    bounds, walls = scenario.world.bounds, scenario.world.walls
-    assert all(
-        bounds.x_min < moment.pose.x < bounds.x_max and bounds.y_min < moment.pose.y < bounds.y_max
-        for moment in drive(scenario.route)
-    )
-    legs = itertools.pairwise(scenario.route.waypoints_m)
-    sides = [side for wall in walls for side in itertools.pairwise(wall)]
-    assert not [(leg, side) for leg in legs for side in sides if crosses(*leg, *side)]
-
-
-@pytest.mark.parametrize("name", builtin_names())
-def test_robot_ends_on_its_last_way_point(name):
-    scenario = load_scenario(name)
-    *_, last = drive(scenario.route)
-    assert math.dist((last.pose.x, last.pose.y), scenario.route.waypoints_m[-1]) < 0.02
 
 
 @pytest.mark.parametrize("turn_source", ["wheels", "gyro"])
@@ -310,16 +230,6 @@ def test_systematic_wheel_errors_are_the_same_in_every_run(bias, distance, turn)
     assert (right_told - left_told) / (right - left) == pytest.approx(turn, abs=1e-3)
 
 
-def test_a_run_in_memory_is_the_run_in_its_log(tmp_path):
-    logged, held = read_run(simulate("mec", tmp_path / "mec.mcap", seed=4)), simulated_run(load_scenario("mec"), 4)
-    assert held.measurements == logged.measurements
-    assert (held.name, held.world, held.prior) == (logged.name, logged.world, logged.prior)
-    for column in ("time_ns", "x", "y"):
-        assert np.array_equal(getattr(held.truth, column), getattr(logged.truth, column))
-    # Logs hold headings as quaternions, which round.
-    assert held.truth.heading == pytest.approx(logged.truth.heading, abs=1e-12)
-
-
 def test_gyro_integrates_to_the_heading_plus_the_bias_the_world_tells_however_slow_it_is():
     """Sums of its readings over their period are the true heading at its stamps, turns between two of them included."""
     scenario = with_reality(ideal(gyro_bias_rad_s=0.02), gyro_hz=4.0)
@@ -353,65 +263,3 @@ def test_prior_is_off_by_what_its_covariance_says():
     off = np.array([np.subtract(prior.pose, start) for prior in priors])
     stds = np.sqrt([priors[0].covariance.xx, priors[0].covariance.yy, priors[0].covariance.hh])
     assert np.mean((off / stds) ** 2) == pytest.approx(1.0, abs=0.25)
-
-
-@pytest.mark.parametrize("name", ["offce", "ofice", "Office"])
-def test_unknown_scenario_is_answered_with_the_nearest(name):
-    with pytest.raises(WorldError, match="did you mean 'office'"):
-        load_scenario(name)
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("speed_m_s = 0.0", "speed_m_s: 0.0 must be greater than zero"),
-        ("turn_rate_rad_s = -1.0", "turn_rate_rad_s: -1.0 must be greater than zero"),
-        ("laps = 0", "laps: 0 must be greater than zero"),
-        ("pause_s = -1.0", "pause_s: -1.0 must not be negative"),
-        ("sped_m_s = 0.5", "did you mean 'speed_m_s'"),
-        ("[reality]\ngyro_hz = 250.0", "gyro_hz: 250.0 is faster than the virtual clock"),
-        ("[reality]\nslip_std = -0.1", "slip_std: -0.1 must not be negative"),
-        ("[reality]\nshadowing_length_m = 0.0", "shadowing_length_m"),
-        ("[reality]\nwall_loss = 3.0", "did you mean 'wall_loss_db'"),
-        ("[truth]\nwall_loss_db = 3.0", "unknown key 'truth'"),
-        ("[reality]\nobstruction_share = 1.1", "obstruction_share: 1.1 is more than always"),
-        ("[reality]\nscans_at_stop = -1", "scans_at_stop: -1 must not be negative"),
-        ("speed_m_s = fast", "not TOML"),
-    ],
-)
-def test_wrong_scenario_is_refused_and_says_where(tmp_path, line, message):
-    path = tmp_path / "mine.toml"
-    path.write_text(SCENARIO + line, encoding="utf-8")
-    with pytest.raises(WorldError, match=message) as refusal:
-        load_scenario(path)
-    assert "mine" in str(refusal.value)
-
-
-@pytest.mark.parametrize("places", ["[]", "[[1.0, 2.0]]", "[[1.0, 2.0], [1.0, 2.0]]"])
-def test_route_that_goes_nowhere_is_refused(tmp_path, places):
-    path = tmp_path / "mine.toml"
-    path.write_text(SCENARIO.replace("[[0.0, 0.0], [2.0, 0.0]]", places), encoding="utf-8")
-    with pytest.raises(WorldError, match="two different places"):
-        load_scenario(path)
-
-
-def test_scenario_of_ones_own_is_driven_from_its_file(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(SCENARIO, encoding="utf-8")
-    run = read_run(simulate(path, tmp_path / "mine.mcap"))
-    assert run.world.name == "mine"
-    assert math.dist((run.truth.x[-1], run.truth.y[-1]), (2.0, 0.0)) < 0.02
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"seed": -1}, {"duration_s": math.nan}, {"duration_s": math.inf}, {"duration_s": 0.0}]
-)
-def test_seed_or_duration_without_a_meaning_is_refused_before_anything_is_written(tmp_path, wrong):
-    with pytest.raises(ParameterError):
-        simulate("office", tmp_path / "run.mcap", **wrong)
-    assert not list(tmp_path.iterdir())
-
-
-def test_output_that_cannot_be_written_is_told(tmp_path):
-    with pytest.raises(LogError, match="cannot be written"):
-        simulate("office", tmp_path, duration_s=1.0)

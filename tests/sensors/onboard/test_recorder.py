@@ -127,7 +127,7 @@ def test_failing_fast_ends_with_the_reason(robot, tmp_path):
 def test_a_disk_that_fills_up_ends_the_recording_cleanly(robot, tmp_path, monkeypatch):
     full = threading.Event()
     monkeypatch.setattr(rolling_log, "free_bytes", lambda _: 1e6 if full.is_set() else 1e12)
-    done = recorded(robot(record="min_free_mb = 100.0"), tmp_path / "out", 60.0, tell=lambda *_: full.set())
+    done = recorded(robot(record="min_free_mb = 100.0"), tmp_path / "out", 60.0, on_status=lambda *_: full.set())
     assert "nearly full: 99 MB less" in done.trouble
     assert not read_run(done.paths[0]).warnings
     with pytest.raises(LogError, match="remove something"):

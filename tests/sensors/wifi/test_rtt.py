@@ -13,6 +13,7 @@ from sensors.wifi.nl80211_fake import INDEX, FakeKernel, three_access_points
 from sensors.wifi.nl80211_message import Command, Message, encode
 from sensors.wifi.rtt import WifiRtt
 from sensors.wifi.settings import Peer
+from tests.sensors.wifi.polling import poll_for
 
 ONE, TWO, THREE = three_access_points()
 PEERS = [{"bssid": bssid, "frequency_mhz": ap.frequency_mhz} for bssid, ap in three_access_points().items()]
@@ -22,14 +23,6 @@ def opened(kernel, peers=PEERS, **given):
     driver = WifiRtt("rtt", kernel.clock, device=kernel, peers=peers, **given)
     driver.open()
     return driver
-
-
-def listen(driver, span_s, said=None):
-    clock, said = driver._clock, [] if said is None else said
-    until_ns = clock.now_ns() + nanoseconds(span_s)
-    while clock.now_ns() < until_ns:
-        said += driver.poll(0.1)
-    return said
 
 
 def answer(status=0, host_time=5, **measured):
@@ -98,7 +91,7 @@ def test_a_result_without_status_or_address_says_nothing():
 
 def test_a_round_has_every_range_with_its_doubt_at_the_time_of_the_last_answer():
     kernel = FakeKernel()
-    ranges, diagnostic = listen(opened(kernel, peers=[PEERS[0] | {"name": "door"}, *PEERS[1:]]), 0.2)
+    ranges, diagnostic = poll_for(opened(kernel, peers=[PEERS[0] | {"name": "door"}, *PEERS[1:]]), 0.2)
     assert [(one.anchor, one.range_m) for one in ranges.readings] == [("door", 1.414), (TWO, 5.099), (THREE, 4.472)]
     assert [one.std_m for one in ranges.readings] == pytest.approx([0.1] * 3, abs=1e-4)
     assert (ranges.time_ns, ranges.seq) == (nanoseconds(0.09), 0)
@@ -109,19 +102,19 @@ def test_a_round_has_every_range_with_its_doubt_at_the_time_of_the_last_answer()
 def test_a_peer_that_does_not_answer_is_told_and_the_others_are_measured():
     kernel = FakeKernel()
     kernel.access_points[TWO].range_m = None
-    ranges, diagnostic = listen(opened(kernel), 0.2)
+    ranges, diagnostic = poll_for(opened(kernel), 0.2)
     assert [one.anchor for one in ranges.readings] == [ONE, THREE]
     assert diagnostic.level is Level.WARN
     assert dict(diagnostic.values)[TWO] == "timeout"
 
 
 def test_if_no_peer_answers_there_is_no_measurement():
-    (diagnostic,) = listen(opened(FakeKernel(access_points={})), 0.2)
+    (diagnostic,) = poll_for(opened(FakeKernel(access_points={})), 0.2)
     assert (diagnostic.level, diagnostic.text) == (Level.WARN, "0 of 3 ranges")
 
 
 def test_rounds_keep_their_period_and_numbers():
-    said = [one for one in listen(opened(FakeKernel(), period_s=2.0), 9.0) if isinstance(one, Ranges)]
+    said = [one for one in poll_for(opened(FakeKernel(), period_s=2.0), 9.0) if isinstance(one, Ranges)]
     assert [one.seq for one in said] == [0, 1, 2, 3, 4]
     assert [seconds(b.time_ns - a.time_ns) for a, b in itertools.pairwise(said)] == [2.0] * 4
 
@@ -130,8 +123,8 @@ def test_the_end_of_another_s_round_is_not_ours():
     kernel = FakeKernel()
     driver = opened(kernel)
     for command in (Command.PEER_MEASUREMENT_RESULT, Command.PEER_MEASUREMENT_COMPLETE):
-        kernel.say(encode(Message(command, {"IFINDEX": INDEX, "COOKIE": 999, **answer()}), 28))
-    ranges, _ = listen(driver, 0.2)
+        kernel.emit(encode(Message(command, {"IFINDEX": INDEX, "COOKIE": 999, **answer()}), 28))
+    ranges, _ = poll_for(driver, 0.2)
     assert len(ranges.readings) == 3
 
 
@@ -152,7 +145,7 @@ def test_rounds_that_never_end_are_told_and_end_in_a_call_for_a_person():
     driver = opened(kernel)
     said = []
     with pytest.raises(UnsupportedError, match="3 times in a row"):
-        listen(driver, 60.0, said)
+        poll_for(driver, 60.0, said)
     assert [one.text for one in said if isinstance(one, Diagnostic)] == [
         "a round of ranging did not end within 12 s"
     ] * 2
@@ -162,9 +155,9 @@ def test_rounds_that_never_end_are_told_and_end_in_a_call_for_a_person():
 def test_a_busy_radio_is_tried_again_later(code):
     kernel = FakeKernel(refusals={Command.PEER_MEASUREMENT_START: code})
     driver = opened(kernel)
-    assert len(listen(driver, 5.5)) == 6
+    assert len(poll_for(driver, 5.5)) == 6
     kernel.refusals.clear()
-    assert any(isinstance(one, Ranges) for one in listen(driver, 1.5))
+    assert any(isinstance(one, Ranges) for one in poll_for(driver, 1.5))
 
 
 def test_without_the_right_the_hint_says_how_to_get_it():

@@ -1,4 +1,4 @@
-"""A keeper brings a sensor back whatever happens to it, and tells of it once each way."""
+"""The lifecycle of a driver reopens it whatever happens, and reports its loss and its return once each."""
 
 import itertools
 
@@ -7,7 +7,7 @@ import pytest
 from fusion.driver import DeviceInfo, Diagnostic, DriverSpec, Level, VirtualClock
 from fusion.errors import BusyError, DeviceLostError, NotFoundError, NotPermittedError
 from fusion.values import Gyro, nanoseconds
-from sensors.onboard.driver_lifecycle import LONGEST_WAIT_S, Keeper, State
+from sensors.onboard.driver_lifecycle import LONGEST_WAIT_S, DriverLifecycle, State
 
 
 class Scripted:
@@ -44,46 +44,46 @@ class Scripted:
 def kept(script=(), opening=(), least_hz=1.0, **options):
     clock = VirtualClock()
     driver = Scripted(clock, script, opening, least_hz)
-    return Keeper("gyro", driver, clock, **options), driver, clock
+    return DriverLifecycle("gyro", driver, clock, **options), driver, clock
 
 
-def run(keeper, turns):
-    return [one for _ in range(turns) for one in keeper.turn(0.1)]
+def run(lifecycle, turns):
+    return [one for _ in range(turns) for one in lifecycle.step(0.1)]
 
 
 def diagnostics(received):
-    return [one.said for one in received if isinstance(one.said, Diagnostic)]
+    return [one.output for one in received if isinstance(one.output, Diagnostic)]
 
 
 def test_what_a_driver_says_comes_out_with_its_time_of_arrival():
-    keeper, _, clock = kept([2])
-    received = run(keeper, 2)
-    assert [one.said.seq for one in received] == [0, 1]
+    lifecycle, _, clock = kept([2])
+    received = run(lifecycle, 2)
+    assert [one.output.seq for one in received] == [0, 1]
     assert {one.received_ns for one in received} == {clock.now_ns()}
-    assert keeper.state is State.RUNNING
+    assert lifecycle.state is State.RUNNING
 
 
 def test_a_device_that_is_missing_at_the_start_is_waited_for_and_told_once_each_way():
     gone = NotFoundError("no device", "plug it in")
-    keeper, driver, _ = kept([1, 1], [gone] * 5 + [None])
-    said = diagnostics(run(keeper, 400))
+    lifecycle, driver, _ = kept([1, 1], [gone] * 5 + [None])
+    said = diagnostics(run(lifecycle, 400))
     assert [diagnostic.level for diagnostic in said] == [Level.WARN, Level.OK, Level.WARN]  # away, back, silent
     assert driver.opened >= 6
-    assert keeper.losses == 2
+    assert lifecycle.losses == 2
 
 
 def test_a_device_that_is_lost_is_let_go_of_before_it_is_opened_again():
-    keeper, driver, _ = kept([1, DeviceLostError("unplugged", "plug it in"), 1])
-    run(keeper, 10)
+    lifecycle, driver, _ = kept([1, DeviceLostError("unplugged", "plug it in"), 1])
+    run(lifecycle, 10)
     assert (driver.opened, driver.closed) == (2, 1)
 
 
 def test_waits_grow_to_their_limit_and_never_end():
-    keeper, driver, clock = kept((), [BusyError("busy", "stop the other")] * 1000)
+    lifecycle, driver, clock = kept((), [BusyError("busy", "stop the other")] * 1000)
     tries = []
     while clock.now_ns() < nanoseconds(3600.0):
         before = driver.opened
-        keeper.turn(0.1)
+        lifecycle.step(0.1)
         if driver.opened > before:
             tries.append(clock.now_ns() / 1e9)
     gaps = [later - earlier for earlier, later in itertools.pairwise(tries)]
@@ -94,12 +94,12 @@ def test_waits_grow_to_their_limit_and_never_end():
 
 
 def test_a_device_that_was_healthy_for_long_is_tried_again_at_once():
-    keeper, _, clock = kept([1] * 700 + [DeviceLostError("gone", "plug it in")], [None, NotFoundError("no", "plug")])
-    keeper.turn(0.1)
-    while keeper.state is State.RUNNING:
-        keeper.turn(0.1)
+    lifecycle, _, clock = kept([1] * 700 + [DeviceLostError("gone", "plug it in")], [None, NotFoundError("no", "plug")])
+    lifecycle.step(0.1)
+    while lifecycle.state is State.RUNNING:
+        lifecycle.step(0.1)
     lost_ns = clock.now_ns()
-    keeper.turn(0.5)
+    lifecycle.step(0.5)
     assert clock.now_ns() - lost_ns <= nanoseconds(0.2)
 
 
@@ -109,42 +109,42 @@ def test_silence_counts_as_loss_only_where_it_is_too_long():
     assert clock.now_ns() > nanoseconds(5.5)
     silent, driver, _ = kept([1], least_hz=10.0)
     said = diagnostics(run(silent, 14))
-    assert "said nothing" in said[0].text
+    assert "has been silent for" in said[0].text
     assert driver.closed == 1
 
 
 def test_a_sensor_that_speaks_only_when_something_happens_may_be_silent_for_ever():
-    keeper, _, _ = kept((), least_hz=0.0)
-    assert not diagnostics(run(keeper, 1000))
+    lifecycle, _, _ = kept((), least_hz=0.0)
+    assert not diagnostics(run(lifecycle, 1000))
 
 
 def test_what_needs_a_person_is_not_tried_again():
-    keeper, driver, _ = kept((), [NotPermittedError("may not", "join the group i2c")])
-    said = diagnostics(run(keeper, 100))
+    lifecycle, driver, _ = kept((), [NotPermittedError("may not", "join the group i2c")])
+    said = diagnostics(run(lifecycle, 100))
     assert driver.opened == 1
-    assert keeper.state is State.FAILED
+    assert lifecycle.state is State.FAILED
     assert "i2c" in said[0].text
 
 
 def test_failing_fast_ends_at_the_first_loss():
-    keeper, driver, _ = kept([DeviceLostError("gone", "plug it in")], fail_fast=True)
-    run(keeper, 50)
-    assert keeper.state is State.FAILED
+    lifecycle, driver, _ = kept([DeviceLostError("gone", "plug it in")], fail_fast=True)
+    run(lifecycle, 50)
+    assert lifecycle.state is State.FAILED
     assert driver.opened == 1
 
 
 def test_a_fault_of_a_driver_is_told_as_its_own_and_costs_only_itself():
-    keeper, driver, _ = kept([ZeroDivisionError("oops"), 1])
-    said = diagnostics(run(keeper, 20))
+    lifecycle, driver, _ = kept([ZeroDivisionError("oops"), 1])
+    said = diagnostics(run(lifecycle, 20))
     assert "ZeroDivisionError" in said[0].text
     assert driver.opened == 2
 
 
 @pytest.mark.parametrize("turns", [0, 1, 5])
 def test_a_keeper_can_be_closed_in_any_state(turns):
-    keeper, driver, _ = kept([1, DeviceLostError("gone", "plug it in")])
-    run(keeper, turns)
-    keeper.close()
-    keeper.close()
-    assert keeper.state is State.CLOSED
+    lifecycle, driver, _ = kept([1, DeviceLostError("gone", "plug it in")])
+    run(lifecycle, turns)
+    lifecycle.close()
+    lifecycle.close()
+    assert lifecycle.state is State.CLOSED
     assert driver.closed >= 2

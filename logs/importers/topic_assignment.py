@@ -1,4 +1,4 @@
-"""Which topic of a bag plays which role: as the user says, or found by its type where only one can be meant.
+"""Assignment of a bag's topics to roles: by the user, or by type where only one topic can be meant.
 
 Nothing is guessed: what could be two topics is refused with both named. The truth is never found by its type, because
 a goal or another filter's estimate looks just the same.
@@ -27,26 +27,26 @@ ROLES: Mapping[str, tuple[str, ...]] = {
 }
 """Roles, and the types that can play each."""
 ANCHOR = "range."
-"""What a role for the ranges of one anchor begins with; its name follows."""
-NOBODY = "none"
+"""Prefix of a role for the ranges of one anchor; its name follows."""
+NO_TOPIC = "none"
 """Stands for a topic where a role is to stay empty."""
 FRAMES = "tf:"
-"""What the truth begins with where it is a transform: ``tf:map>base_link``."""
+"""Prefix of a truth that is a transform: ``tf:map>base_link``."""
 AS_FRAMES = "write it as 'truth=tf:map>base_link', in quotes: a shell takes > for itself"
 
 
 @dataclass
-class Cast:
-    """Who plays what; a role that stays empty is missing."""
+class TopicAssignment:
+    """Topics by role; a role that stays empty is missing."""
 
     topics: dict[str, Topic] = field(default_factory=dict)
     """The one topic of a role: odom, wheels, gyro, wifi, truth."""
     joints: tuple[str, ...] = ()
     """The joints that are wheels, in the wheel order of the world."""
     ranges: list[tuple[str, str]] = field(default_factory=list)
-    """Topics of ranges, each with the anchor it is of; "" where its messages say."""
+    """Topics of ranges, each with the anchor it is of; "" where its messages name it."""
     transforms: list[str] = field(default_factory=list)
-    """Topics of transforms that tell the truth, and ``frames``, which of them."""
+    """Topics of transforms that hold the truth, and ``frames``, the one of them."""
     frames: str = ""
 
     @property
@@ -78,23 +78,25 @@ def truth_frames(topics: Mapping[str, str]) -> tuple[str, str] | None:
     return parent, child
 
 
-def assign(bag: Bag, world: World, topics: Mapping[str, str]) -> Cast:
-    """Give every role its topic; raises `ParameterError` for what the bag has not, or has more than once."""
-    cast = Cast()
+def assign(bag: Bag, world: World, topics: Mapping[str, str]) -> TopicAssignment:
+    """Assign a topic to every role; raises `ParameterError` for what the bag has not, or has more than once."""
+    assignment = TopicAssignment()
     for role, asked in topics.items():
         _check_role(role, world)
-        if asked != NOBODY:
-            _give(cast, bag, role, asked)
-    if "odom" in cast.topics and "wheels" in cast.topics:
+        if asked != NO_TOPIC:
+            _assign_named(assignment, bag, role, asked)
+    if "odom" in assignment.topics and "wheels" in assignment.topics:
         raise ParameterError(f"{bag.path}: odom and wheels are both named, and would count the motion twice; leave one")
-    for name in cast.used:
-        if cast.used.count(name) > 1:
+    for name in assignment.used:
+        if assignment.used.count(name) > 1:
             raise ParameterError(f"{bag.path}: {name} is named for two roles; each needs a topic of its own")
-    free = [topic for topic in bag.topics.values() if topic.count and topic.understood and topic.name not in cast.used]
-    _find(cast, bag, world, topics, free)
-    if "wheels" in cast.topics:
-        cast.joints = wheel_joints(cast.topics["wheels"], cast.joints, world.robot)
-    return cast
+    free = [
+        topic for topic in bag.topics.values() if topic.count and topic.understood and topic.name not in assignment.used
+    ]
+    _assign_by_type(assignment, bag, world, topics, free)
+    if "wheels" in assignment.topics:
+        assignment.joints = wheel_joints(assignment.topics["wheels"], assignment.joints, world.robot)
+    return assignment
 
 
 def _check_role(role: str, world: World) -> None:
@@ -106,20 +108,20 @@ def _check_role(role: str, world: World) -> None:
         raise ParameterError(f"there is no role {role!r}; {did_you_mean(role, [*ROLES, ANCHOR + 'ANCHOR'])}")
 
 
-def _give(cast: Cast, bag: Bag, role: str, asked: str) -> None:
-    """The role to the topic that was named for it."""
+def _assign_named(assignment: TopicAssignment, bag: Bag, role: str, asked: str) -> None:
+    """Assign the topic that was named for a role."""
     if role == "truth" and asked.startswith(FRAMES):
-        cast.frames = ">".join(truth_frames({role: asked}) or ())
-        cast.transforms = _transforms(bag, cast.frames)
+        assignment.frames = ">".join(truth_frames({role: asked}) or ())
+        assignment.transforms = _transforms(bag, assignment.frames)
         return
     name, _, joints = asked.partition(":") if role == "wheels" else (asked, "", "")
     kinds = (RANGE,) if role.startswith(ANCHOR) else ROLES[role]
     topic = _named(bag, role, name, kinds)
     if role.startswith(ANCHOR) or role == "range":
-        cast.ranges.append((name, role.removeprefix(ANCHOR) if role.startswith(ANCHOR) else ""))
+        assignment.ranges.append((name, role.removeprefix(ANCHOR) if role.startswith(ANCHOR) else ""))
     else:
-        cast.topics[role] = topic
-        cast.joints = tuple(joint.strip() for joint in joints.split(",")) if joints else cast.joints
+        assignment.topics[role] = topic
+        assignment.joints = tuple(joint.strip() for joint in joints.split(",")) if joints else assignment.joints
 
 
 def _named(bag: Bag, role: str, name: str, kinds: tuple[str, ...]) -> Topic:
@@ -137,12 +139,12 @@ def _named(bag: Bag, role: str, name: str, kinds: tuple[str, ...]) -> Topic:
     if topic.missing:
         raise ParameterError(f"{bag.path}: {role}: {name} cannot be read; {topic.missing}")
     if not topic.count:
-        raise ParameterError(f"{bag.path}: {role}: {name} holds no message; leave the role out with {role}={NOBODY}")
+        raise ParameterError(f"{bag.path}: {role}: {name} holds no message; leave the role out with {role}={NO_TOPIC}")
     return topic
 
 
 def _transforms(bag: Bag, pair: str) -> list[str]:
-    """Every topic that tells the transform ``parent>child``."""
+    """Every topic that holds the transform ``parent>child``."""
     all_transforms = [topic for topic in bag.topics.values() if topic.type in TRANSFORM_TYPES]
     found = [topic.name for topic in all_transforms if pair in topic.names]
     if not found:
@@ -152,10 +154,12 @@ def _transforms(bag: Bag, pair: str) -> list[str]:
     return found
 
 
-def _find(cast: Cast, bag: Bag, world: World, topics: Mapping[str, str], free: Sequence[Topic]) -> None:
-    """Fill the roles that nobody was named for, but for the truth. The motion is told once: by the odometry first."""
+def _assign_by_type(
+    assignment: TopicAssignment, bag: Bag, world: World, topics: Mapping[str, str], free: Sequence[Topic]
+) -> None:
+    """Fill the roles without a named topic, but for the truth. Motion counts once: that of the odometry first."""
     for role in ("odom", "wheels", "gyro", "wifi"):
-        moves = role in ("odom", "wheels") and ("odom" in cast.topics or "wheels" in cast.topics)
+        moves = role in ("odom", "wheels") and ("odom" in assignment.topics or "wheels" in assignment.topics)
         has_wheels = bool(WHEELS[world.robot.drive])
         if role in topics or moves or (role == "wheels" and not has_wheels):
             continue
@@ -163,10 +167,10 @@ def _find(cast: Cast, bag: Bag, world: World, topics: Mapping[str, str], free: S
         if len(candidates) > 1:
             raise _ambiguous(bag, role, [topic.name for topic in candidates])
         if candidates:
-            cast.topics[role] = candidates[0]
+            assignment.topics[role] = candidates[0]
     if "range" not in topics:
         named = {role.removeprefix(ANCHOR) for role in topics}
-        cast.ranges += _anchored(bag, {anchor.id for anchor in world.anchors} - named, free)
+        assignment.ranges += _anchored(bag, {anchor.id for anchor in world.anchors} - named, free)
 
 
 def _anchored(bag: Bag, anchors: set[str], free: Sequence[Topic]) -> list[tuple[str, str]]:
@@ -181,5 +185,5 @@ def _anchored(bag: Bag, anchors: set[str], free: Sequence[Topic]) -> list[tuple[
 
 def _ambiguous(bag: Bag, role: str, names: Sequence[str]) -> ParameterError:
     return ParameterError(
-        f"{bag.path}: {role} could be {' or '.join(names)}; say which with {role}={names[0]}, or {role}={NOBODY}"
+        f"{bag.path}: {role} could be {' or '.join(names)}; say which with {role}={names[0]}, or {role}={NO_TOPIC}"
     )

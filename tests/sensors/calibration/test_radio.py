@@ -12,9 +12,9 @@ from fusion import LogError, RangeReading, Ranges, RssiReading, WifiScan
 from fusion.radio import PathLoss
 from logs.truth import TruthTrack
 from sensors.calibration.line import fit_line
+from sensors.calibration.place_medians import place_medians
 from sensors.calibration.radio import calibrate_radio, kinds_in
 from sensors.calibration.readings_by_place import gather, places
-from sensors.calibration.spots import spots
 from sensors.cli.calibrate_radio import findings
 
 AT = np.array([[0.0, 0.0, 2.0], [12.0, 0.0, 2.0], [6.0, 9.0, 2.0]])
@@ -64,7 +64,7 @@ def test_world_is_told_over_what_path_shadowing_stays_alike(rssi_run, length):
 def calibrate_line(run):
     """The line alone: scores of places left out and advice, which cost nine tenths of a calibration, are not wanted."""
     readings = gather([run], "rssi")
-    return fit_line(spots(readings, run.world.anchors[0].radio.path_loss_exponent), len(readings.names))
+    return fit_line(place_medians(readings, run.world.anchors[0].radio.path_loss_exponent), len(readings.names))
 
 
 def test_without_noise_the_line_is_exact(rssi_run):
@@ -209,7 +209,7 @@ def test_readings_that_are_no_numbers_are_left_out(rssi_run):
     assert (found.readings.anchor == 0).sum() == 30 * 5
 
 
-def test_anchors_heard_seldom_are_told(rssi_run):
+def test_anchors_received_seldom_are_reported(rssi_run):
     points = floor(13)
     run = rssi_run(points, expected(points))
     deaf = tuple(
@@ -217,8 +217,8 @@ def test_anchors_heard_seldom_are_told(rssi_run):
         for i, scan in enumerate(run.measurements)
     )
     remarks = findings([dataclasses.replace(run, measurements=deaf)]).remarks
-    assert any("a was heard in 50 % of the scans" in remark for remark in remarks)
-    assert not any("b was heard" in remark for remark in remarks)
+    assert any("a was received in 50 % of the scans" in remark for remark in remarks)
+    assert not any("b was received" in remark for remark in remarks)
 
 
 def test_a_slope_that_cannot_be_told_from_the_level_is_warned_of(rssi_run):
@@ -226,7 +226,7 @@ def test_a_slope_that_cannot_be_told_from_the_level_is_warned_of(rssi_run):
     points = np.column_stack([4.0 * np.cos(angles), 4.0 * np.sin(angles)]) * np.linspace(0.97, 1.03, 12)[:, None]
     values = expected(points)[:, :1] + np.random.default_rng(14).normal(0.0, 3.0, (12, 1))
     run = rssi_run(points, values, world=[{"id": "a", "position_m": [0.0, 0.0, 2.0]}])
-    assert any("can hardly be told apart" in remark for remark in findings([run]).remarks)
+    assert any("can hardly be separated" in remark for remark in findings([run]).remarks)
 
 
 def test_poor_runs_are_refused_with_the_remedy(rssi_run):

@@ -7,8 +7,8 @@ import pytest
 from fusion.driver import BootClock, DeviceInfo, Diagnostic, DriverSpec, Level, VirtualClock
 from fusion.errors import DeviceLostError, NotFoundError
 from fusion.values import Gyro
-from sensors.onboard.driver_lifecycle import Keeper, Received, State
-from sensors.onboard.supervisor import Mailbox, Supervisor
+from sensors.onboard.driver_lifecycle import DriverLifecycle, Received, State
+from sensors.onboard.supervisor import BoundedQueue, Supervisor
 
 TENTH_NS = 100_000_000
 
@@ -51,7 +51,7 @@ class Stuck(Counter):
 
 def supervised(*drivers, **options):
     clock = BootClock()
-    return Supervisor([Keeper(driver.name, driver, clock) for driver in drivers], clock, **options)
+    return Supervisor([DriverLifecycle(driver.name, driver, clock) for driver in drivers], clock, **options)
 
 
 def taken(supervisor, count):
@@ -65,7 +65,7 @@ def test_what_all_sensors_say_comes_out_in_the_order_of_its_arrival():
     with supervised(Counter("a", 50), Counter("b", 30)) as supervisor:
         received = taken(supervisor, 80)
     for name, count in (("a", 50), ("b", 30)):
-        assert [one.said.seq for one in received if one.said.sensor == name] == list(range(1, count + 1))
+        assert [one.output.seq for one in received if one.output.sensor == name] == list(range(1, count + 1))
 
 
 def test_a_sensor_that_hangs_holds_up_no_other():
@@ -76,25 +76,25 @@ def test_a_sensor_that_hangs_holds_up_no_other():
 
 
 def test_a_full_queue_drops_its_oldest_and_counts():
-    box = Mailbox(capacity=3)
-    box.put([Received(i, Gyro(i, "g", i, 0.0)) for i in range(5)])
-    assert [one.received_ns for one in box.take()] == [2, 3, 4]
-    assert (box.messages, box.dropped) == (5, 2)
-    assert box.take() == []
+    queue = BoundedQueue(capacity=3)
+    queue.put([Received(i, Gyro(i, "g", i, 0.0)) for i in range(5)])
+    assert [one.received_ns for one in queue.take()] == [2, 3, 4]
+    assert (queue.messages, queue.dropped) == (5, 2)
+    assert queue.take() == []
 
 
 def test_diagnostics_are_no_measurements():
-    box = Mailbox()
-    box.put([Received(1, Diagnostic(1, "g", Level.WARN, "gone"))])
-    assert (box.messages, box.latest) == (0, None)
+    queue = BoundedQueue()
+    queue.put([Received(1, Diagnostic(1, "g", Level.WARN, "gone"))])
+    assert (queue.messages, queue.latest) == (0, None)
 
 
 def test_a_stale_value_is_refused_and_says_how_old_it_is():
     clock = VirtualClock()
-    supervisor = Supervisor([Keeper("g", Counter("g", 0), clock)], clock)
+    supervisor = Supervisor([DriverLifecycle("g", Counter("g", 0), clock)], clock)
     with pytest.raises(DeviceLostError, match="nothing yet"):
         supervisor.latest("g", 1.0)
-    supervisor._boxes["g"].put([Received(0, Gyro(0, "g", 1, 0.5))])
+    supervisor._queues["g"].put([Received(0, Gyro(0, "g", 1, 0.5))])
     assert supervisor.latest("g", 1.0).rate_rad_s == 0.5
     clock.sleep(1.5)
     with pytest.raises(DeviceLostError, match=r"1\.50 s old"):
@@ -105,10 +105,10 @@ def test_a_stale_value_is_refused_and_says_how_old_it_is():
 
 def test_the_status_tells_rate_age_and_whether_a_device_holds_its_driver_up():
     clock = VirtualClock()
-    keeper = Keeper("g", Counter("g", 0), clock)
-    supervisor = Supervisor([keeper], clock)
-    keeper.turn(0.1)
-    supervisor._boxes["g"].put([Received(i * TENTH_NS, Gyro(i * TENTH_NS, "g", i, 0.0)) for i in range(5)])
+    lifecycle = DriverLifecycle("g", Counter("g", 0), clock)
+    supervisor = Supervisor([lifecycle], clock)
+    lifecycle.step(0.1)
+    supervisor._queues["g"].put([Received(i * TENTH_NS, Gyro(i * TENTH_NS, "g", i, 0.0)) for i in range(5)])
     clock.sleep(1.0)
     status = supervisor.statuses()[0]
     assert (status.state, status.messages, status.age_s) == (State.RUNNING, 5, 0.6)
@@ -119,18 +119,18 @@ def test_the_status_tells_rate_age_and_whether_a_device_holds_its_driver_up():
 
 def test_old_news_that_comes_now_is_old_and_a_clock_that_is_ahead_makes_nothing_fresher():
     clock = VirtualClock(20 * TENTH_NS)
-    supervisor = Supervisor([Keeper("g", Counter("g", 0), clock)], clock)
+    supervisor = Supervisor([DriverLifecycle("g", Counter("g", 0), clock)], clock)
     for stamp_ns, age_s in ((5 * TENTH_NS, 1.5), (90 * TENTH_NS, 0.0), (TENTH_NS, 0.0)):
-        supervisor._boxes["g"].put([Received(20 * TENTH_NS, Gyro(stamp_ns, "g", 1, 0.5))])
+        supervisor._queues["g"].put([Received(20 * TENTH_NS, Gyro(stamp_ns, "g", 1, 0.5))])
         assert supervisor.statuses()[0].age_s == age_s
     assert supervisor.latest("g", 0.1).time_ns == 90 * TENTH_NS
 
 
 def test_arrivals_never_run_backwards_from_one_batch_to_the_next():
     clock = VirtualClock()
-    supervisor = Supervisor([Keeper(name, Counter(name, 0), clock) for name in "ab"], clock)
-    supervisor._boxes["a"].put([Received(7, Gyro(7, "a", 1, 0.0))])
+    supervisor = Supervisor([DriverLifecycle(name, Counter(name, 0), clock) for name in "ab"], clock)
+    supervisor._queues["a"].put([Received(7, Gyro(7, "a", 1, 0.0))])
     supervisor._news.set()
     assert [one.received_ns for one in supervisor.take(0.0)] == [7]
-    supervisor._boxes["b"].put([Received(5, Gyro(5, "b", 1, 0.0)), Received(9, Gyro(9, "b", 2, 0.0))])
-    assert [(one.received_ns, one.said.seq) for one in supervisor.take(0.0)] == [(7, 1), (9, 2)]
+    supervisor._queues["b"].put([Received(5, Gyro(5, "b", 1, 0.0)), Received(9, Gyro(9, "b", 2, 0.0))])
+    assert [(one.received_ns, one.output.seq) for one in supervisor.take(0.0)] == [(7, 1), (9, 2)]

@@ -17,13 +17,11 @@ from fusion import (
     ProtocolError,
     SettingError,
     VirtualClock,
-    WheelTicks,
 )
 from sensors.gyro import mpu6050 as gyro_mpu6050
 from sensors.gyro.iio import FakeIio, GyroIio
 from sensors.gyro.mpu6050 import FakeMpu6050, GyroMpu6050, parse
 from sensors.gyro.sampling import UnreadableError
-from sensors.onboard.gyro_bias import Standstill
 
 
 def chip(**settings):
@@ -140,36 +138,3 @@ def test_the_kernels_gyro_is_found_by_name_and_told_in_its_own_scale(tmp_path):
     assert dict(diagnostic.values)["temperature_c"] == "39.47"
     with pytest.raises(NotFoundError, match=r"no gyro 'mpu' .*mpu6050 \(iio:device0\)"):
         GyroIio("gyro", VirtualClock(), **device.settings, device="mpu").open()
-
-
-# The bias that standing wheels tell.
-
-
-def stand(rates, *, moving=(), sensor="gyro"):
-    """Diagnostics on ticks every half second and ten rates between; ``moving``: seconds in which the wheels count."""
-    watch, told, count = Standstill(), [], 0
-    for half in range(len(rates) // 10):
-        for i, rate in enumerate(rates[10 * half : 10 * half + 10]):
-            told += watch.hear(Gyro(half * 500_000_000 + i * 50_000_000 + 1, sensor, i, rate))
-        count += half // 2 in moving
-        told += watch.hear(WheelTicks((half + 1) * 500_000_000, "wheels", half, (count, count)))
-    return told
-
-
-def test_five_seconds_of_standing_tell_the_bias():
-    diagnostic, *_ = stand([0.004 + (0.001 if i % 2 else -0.001) for i in range(240)])
-    values = {key: float(value) for key, value in diagnostic.values}
-    assert (diagnostic.sensor, diagnostic.text) == ("gyro", "bias at standstill")
-    assert values["bias_rad_s"] == pytest.approx(0.004)
-    assert values["bias_std_rad_s"] == pytest.approx(0.001 / math.sqrt(values["samples"]), rel=0.02)
-
-
-def test_moving_or_shaken_robots_tell_none():
-    assert stand([0.004] * 400, moving=(2, 6, 10, 14, 18)) == []
-    assert stand([0.1 if i % 2 else -0.1 for i in range(240)]) == []
-
-
-def test_a_hand_that_turns_the_standing_robot_is_no_bias():
-    told = [diagnostic.text for diagnostic in stand([0.004] * 130 + [0.1] * 230)]
-    assert told[0] == "bias at standstill"
-    assert "turned while the wheels stood" in told

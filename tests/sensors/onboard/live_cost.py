@@ -1,7 +1,7 @@
 """What a live pose costs: processor seconds a second, of the whole process with its simulated sensors.
 
 Gyro at 100 Hz, which gives the turn, encoders at 20 Hz, Wi-Fi at 2 Hz, a pose 10 times a second. Run it from the top
-folder: ``python tests/sensors/live_cost.py [SECONDS]``.
+folder: ``python tests/sensors/onboard/live_cost.py [SECONDS]``.
 """
 
 import sys
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sensors.onboard.live import live
 from sensors.onboard.robot_file import RobotFile
-from sensors.onboard.sensor_loop import Sensing
+from sensors.onboard.sensor_loop import SensorLoop
 from sensors.simulation.scenario import scenario_text
 
 
@@ -40,9 +40,9 @@ def cost(work):
 
 
 def sensors_alone(trolley, duration_s):
-    with Sensing(trolley) as sensing:
-        sensing.await_open(10.0, threading.Event())
-        yield from sensing.turns(threading.Event(), duration_s, 0.1)
+    with SensorLoop(trolley) as loop:
+        loop.await_open(10.0, threading.Event())
+        yield from loop.batches(threading.Event(), duration_s, 0.1)
 
 
 def main(duration_s):

@@ -6,7 +6,7 @@ import pytest
 
 from fusion.driver import VirtualClock
 from fusion.errors import SettingError
-from sensors.onboard.driver_lifecycle import Keeper, State
+from sensors.onboard.driver_lifecycle import DriverLifecycle, State
 from sensors.simulation.drivers import SimulatedEncoders, SimulatedGyro, SimulatedTracker, SimulatedWifi
 from sensors.simulation.robot import SimulatedRobot
 from sensors.simulation.scenario import load_scenario
@@ -17,11 +17,11 @@ START_NS = 5_000_000_000
 def heard(made, *, duration_s=20.0, **settings):
     """All that one sensor says, by the time since the robot's start."""
     clock = VirtualClock(START_NS)
-    keeper = Keeper("s", made("s", clock, scenario="room", **settings), clock)
+    lifecycle = DriverLifecycle("s", made("s", clock, scenario="room", **settings), clock)
     received = []
     while clock.now_ns() - START_NS < duration_s * 1e9:
-        received += keeper.turn(0.1)
-    return [one.said for one in received if isinstance(one.said, made.kind)]
+        received += lifecycle.step(0.1)
+    return [one.output for one in received if isinstance(one.output, made.kind)]
 
 
 def elapsed_s(said):
@@ -109,8 +109,8 @@ def test_a_misspelt_fault_is_refused(faults, told):
 
 def test_a_sensor_that_the_scenario_lacks_needs_a_person():
     clock = VirtualClock()
-    keeper = Keeper("g", SimulatedGyro("g", clock, scenario="corridor"), clock)
-    keeper.turn(0.1)
-    assert keeper.state is State.FAILED
+    lifecycle = DriverLifecycle("g", SimulatedGyro("g", clock, scenario="corridor"), clock)
+    lifecycle.step(0.1)
+    assert lifecycle.state is State.FAILED
     with pytest.raises(SettingError, match="did you mean 'corridor'"):
         SimulatedGyro("g", clock, scenario="coridor")

@@ -13,11 +13,11 @@ from fusion.odometry import Odometer
 from fusion.robot import Robot
 from fusion.values import nanoseconds
 from logs.truth import TruthTrack
-from sensors.calibration.arcs import Roll, arc_end
-from sensors.calibration.odometry import calibrate_odometry, fit_roll, halves, score_held_out
+from sensors.calibration.arcs import WheelScales, arc_end
+from sensors.calibration.odometry import calibrate_odometry, fit_scales, halves, score_held_out
 from sensors.calibration.segments import SPIN, STRAIGHT, find_segments, read_segments
 from sensors.calibration.umbmark import umbmark
-from sensors.calibration.wheel_residuals import linear_trend, rolled
+from sensors.calibration.wheel_residuals import linear_trend, measured_segments
 from sensors.calibration.wheels import wheels
 
 TRACK = 0.3
@@ -38,9 +38,9 @@ def unequal(run, ratio):
 def test_a_robot_without_noise_is_found_exactly(drive):
     run = drive(distance_scale_bias=0.04, track_scale_bias=0.1, slip_std=0.0, robot={"ticks_per_revolution": 20_000})
     found = calibrate_odometry([run])
-    assert found.fit.roll.left == pytest.approx(1.0 / 1.04, rel=1e-4)
-    assert found.fit.roll.right == pytest.approx(1.0 / 1.04, rel=1e-4)
-    assert found.fit.roll.track_m == pytest.approx(1.1 * TRACK, rel=1e-3)
+    assert found.fit.scales.left == pytest.approx(1.0 / 1.04, rel=1e-4)
+    assert found.fit.scales.right == pytest.approx(1.0 / 1.04, rel=1e-4)
+    assert found.fit.scales.track_m == pytest.approx(1.1 * TRACK, rel=1e-3)
     assert {score.what: score.after < 0.1 * score.before for score in found.scores} == {
         "length of a piece": True,
         "turn of a piece": True,
@@ -80,15 +80,15 @@ def test_turning_and_moving_the_floor_changes_nothing(calibrated, turned, moved)
         truth.time_ns, c * truth.x - s * truth.y + moved, s * truth.x + c * truth.y - moved, truth.heading + turned
     )
     two = calibrate_odometry([dataclasses.replace(run, truth=other)])
-    assert two.fit.roll == pytest.approx(one.fit.roll, rel=1e-6)
+    assert two.fit.scales == pytest.approx(one.fit.scales, rel=1e-6)
 
 
 def test_what_is_fitted_is_what_estimators_get(drive):
     """The same ticks through the host's own odometer, with the numbers in the world, end where the arcs do."""
     run = unequal(drive(distance_scale_bias=0.03, track_scale_bias=0.08), 1.02)
-    roll = Roll(0.98, 1.01, 0.33)
-    robot = roll.told(run.world.robot)
-    assert Roll.of(robot) == pytest.approx(roll)
+    scales = WheelScales(0.98, 1.01, 0.33)
+    robot = scales.applied_to(run.world.robot)
+    assert WheelScales.of(robot) == pytest.approx(scales)
     odometer, moved = Odometer(robot), [0.0, 0.0]
     state = odometer.start(run.measurements[0].time_ns)
     for measurement in run.measurements:
@@ -98,19 +98,19 @@ def test_what_is_fitted_is_what_estimators_get(drive):
                 moved[0] += step.distance_m
                 moved[1] += step.turn_rad
     told = wheels(run)
-    end = arc_end(roll, np.diff(told.left), np.diff(told.right))
-    ahead = 0.5 * (roll.left * told.left[-1] + roll.right * told.right[-1])
+    end = arc_end(scales, np.diff(told.left), np.diff(told.right))
+    ahead = 0.5 * (scales.left * told.left[-1] + scales.right * told.right[-1])
     assert moved == pytest.approx([ahead, end.heading], abs=1e-9)
 
 
 def test_exact_arc_of_a_quarter_circle():
     """Left 0, right pi/2 with track 1: a quarter turn about the left wheel, half a metre to its right."""
     steps = np.full(7, math.pi / 2 / 7)
-    end = arc_end(Roll(1.0, 1.0, 1.0), np.zeros(7), steps)
+    end = arc_end(WheelScales(1.0, 1.0, 1.0), np.zeros(7), steps)
     assert end == pytest.approx(Pose(0.5, 0.5, math.pi / 2))
 
 
-def square(sense, roll, nominal, side=4.0, steps=50):
+def square(sense, scales, nominal, side=4.0, steps=50):
     """End offset of a robot that believes it drives a square: true minus calculated, (1, 2)."""
     left, right = [], []
     for corner in range(4):
@@ -119,21 +119,21 @@ def square(sense, roll, nominal, side=4.0, steps=50):
         if corner < 3:
             left += [-sense * math.pi / 4 * nominal / steps] * steps
             right += [sense * math.pi / 4 * nominal / steps] * steps
-    ends = [arc_end(each, np.array(left), np.array(right)) for each in (roll, Roll(1.0, 1.0, nominal))]
+    ends = [arc_end(each, np.array(left), np.array(right)) for each in (scales, WheelScales(1.0, 1.0, nominal))]
     return np.array([[ends[0].x - ends[1].x, ends[0].y - ends[1].y]])
 
 
 @pytest.mark.parametrize(("track", "ratio"), [(1.03, 1.0), (0.98, 1.0), (1.0, 1.001), (1.02, 1.001)])
 def test_closed_form_of_umbmark_finds_small_errors(track, ratio):
-    roll = Roll(2.0 / (1.0 + ratio), 2.0 * ratio / (1.0 + ratio), track * 0.5)
-    found = umbmark(square(-1, roll, 0.5), square(1, roll, 0.5), 4.0, 0.5)
+    scales = WheelScales(2.0 / (1.0 + ratio), 2.0 * ratio / (1.0 + ratio), track * 0.5)
+    found = umbmark(square(-1, scales, 0.5), square(1, scales, 0.5), 4.0, 0.5)
     assert found.track_ratio == pytest.approx(track, abs=0.003)
     assert found.diameter_ratio == pytest.approx(ratio, abs=0.0003)
 
 
 def test_umbmark_of_a_perfect_robot_is_nothing():
-    roll = Roll(1.0, 1.0, 0.5)
-    found = umbmark(square(-1, roll, 0.5), square(1, roll, 0.5), 4.0, 0.5)
+    scales = WheelScales(1.0, 1.0, 0.5)
+    found = umbmark(square(-1, scales, 0.5), square(1, scales, 0.5), 4.0, 0.5)
     assert (found.e_max_m, found.track_ratio, found.diameter_ratio) == pytest.approx((0.0, 1.0, 1.0))
 
 
@@ -149,7 +149,7 @@ def test_squares_are_found_and_judged_without_having_been_fitted(drive):
 def test_the_papers_line_is_the_scale_of_the_straight_moves(drive):
     run = drive(distance_scale_bias=0.05)
     told = wheels(run)
-    trend = linear_trend(rolled(find_segments(run, 0, told), [told], run.world.robot))
+    trend = linear_trend(measured_segments(find_segments(run, 0, told), [told], run.world.robot))
     assert trend.scale.holds(1.0 / 1.05)
     assert trend.offset_m.holds(0.0)
 
@@ -187,14 +187,14 @@ def test_segments_are_measured_by_hand_too(calibrated, tmp_path):
     path.write_text("\n".join(rows))
     assert {each.kind for each in read_segments(path, run, 0)} == {STRAIGHT, SPIN}
     blind = dataclasses.replace(run, truth=None)
-    assert calibrate_odometry([blind], path).fit.roll == pytest.approx(found.fit.roll, rel=1e-6)
+    assert calibrate_odometry([blind], path).fit.scales == pytest.approx(found.fit.scales, rel=1e-6)
 
 
 def test_nothing_is_scored_that_was_fitted(drive):
     """Each half is judged by the other: a half that is spoiled makes both scores bad."""
     run = drive(laps=2, slip_std=0.0)
     told = wheels(run)
-    pieces = rolled(find_segments(run, 0, told), [told], run.world.robot)
+    pieces = measured_segments(find_segments(run, 0, told), [told], run.world.robot)
     first = {id(each) for each in halves(pieces)[0]}
     spoiled = [
         each._replace(segment=each.segment._replace(distance_m=1.1 * each.segment.distance_m))
@@ -202,7 +202,7 @@ def test_nothing_is_scored_that_was_fitted(drive):
         else each
         for each in pieces
     ]
-    after = {score.what: score.after for score in score_held_out(spoiled, Roll(1.0, 1.0, TRACK), TRACK)}
+    after = {score.what: score.after for score in score_held_out(spoiled, WheelScales(1.0, 1.0, TRACK), TRACK)}
     # Both halves miss the other by a tenth of some two metres; in-sample nothing would be left.
     assert after["length of a piece"] > 0.15
 
@@ -222,4 +222,4 @@ def test_poor_runs_are_refused_with_the_remedy(drive, change, message):
 def test_lines_alone_are_too_few():
     robot = Robot(drive="differential", track_width_m=TRACK)
     with pytest.raises(LogError, match=r"three straight lines and four spins"):
-        fit_roll([], robot.track_width_m)
+        fit_scales([], robot.track_width_m)

@@ -16,7 +16,7 @@ from sensors.cli.live import record as line
 from sensors.onboard.driver_lifecycle import Received, State
 from sensors.onboard.live import live
 from sensors.onboard.recorder import record
-from sensors.onboard.sensor_loop import Sensing
+from sensors.onboard.sensor_loop import SensorLoop
 from sensors.onboard.supervisor import Status
 from tests.sensors.robot_files import robot_text
 
@@ -101,7 +101,7 @@ def test_motor_commands_that_are_there_need_no_word(robot, tmp_path):
 )
 def test_a_recording_without_its_motor_commands_warns_and_so_does_its_log(robot, tmp_path, faults, required, degraded):
     warnings = []
-    options = {"degraded": degraded, "tell": lambda _, warning: warnings.append(warning)}
+    options = {"degraded": degraded, "on_status": lambda _, warning: warnings.append(warning)}
     one = robot(faults=faults, required={"motors": required})
     done = recorded(one, tmp_path / "out", 3.0, **options)
     assert done.trouble == ""
@@ -144,13 +144,13 @@ def test_the_commands_warn_once_while_they_run_and_at_the_end(tmp_path, capsys):
 
 def test_a_driver_that_its_device_holds_up_states_no_direction(robot):
     """It reports nothing, for it does not come back; its status shows it."""
-    sensing = Sensing(robot())
+    loop = SensorLoop(robot())
     said = [MotorCommand(0, "motors", 0, (0.6,) * 4), *(WheelTicks(k, "encoders", k, (20 * k,) * 4) for k in range(3))]
-    sensing._supervisor.take = lambda _: [Received(one.time_ns, one) for one in said]
-    next(sensing.turns(threading.Event()))
-    assert sensing.warning == ""
-    sensing.statuses = lambda: [Status("motors", State.STALLED, None, None, 1, 0, 0, "its device holds the driver up")]
-    sensing._report()
+    loop._supervisor.take = lambda _: [Received(one.time_ns, one) for one in said]
+    next(loop.batches(threading.Event()))
+    assert loop.warning == ""
+    loop.statuses = lambda: [Status("motors", State.STALLED, None, None, 1, 0, 0, "its device holds the driver up")]
+    loop._report()
     said = [WheelTicks(k, "encoders", k, (20 * k,) * 4) for k in range(3, 5)]
-    next(sensing.turns(threading.Event()))
-    assert "for 0.41 m of a wheel's way" in sensing.warning
+    next(loop.batches(threading.Event()))
+    assert "for 0.41 m of a wheel's way" in loop.warning

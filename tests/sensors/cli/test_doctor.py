@@ -53,7 +53,7 @@ def test_what_a_driver_lacks_is_named_with_its_cure(monkeypatch):
     assert "fusion-localization[sensors]" in cures["g: the package no_such_module is missing"]
     assert "+net_admin" in cures["g: CAP_NET_ADMIN is not held"]
     assert "usermod -aG no_such_group" in cures["g: you are not in the group no_such_group"]
-    assert "g: no such device is to be seen" in cures
+    assert "g: no such device is present" in cures
     assert cures["the radio saves power"] == "iw dev wlan0 set power_save off"
 
 

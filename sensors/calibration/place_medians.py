@@ -1,4 +1,4 @@
-"""Readings of one anchor at one place, as one number: what a radio calibration is fitted to."""
+"""Readings of one anchor at one place as one number, to which a radio calibration is fitted."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ NORMAL = 1.4826
 """Standard deviation over median absolute deviation of a Gaussian."""
 
 
-class Spots(NamedTuple):
-    """One row (n,) for each anchor and place: columns as in `Readings`, ``size``: how many readings it is.
+class PlaceMedians(NamedTuple):
+    """One row (n,) for each anchor and place: columns as in `Readings`, ``size``: its number of readings.
 
-    ``scatter``: standard deviation of single readings about their own spot, robust, in the reading's unit.
+    ``scatter``: standard deviation of single readings about their own median, robust, in the reading's unit.
     """
 
     anchor: Whole
@@ -29,22 +29,13 @@ class Spots(NamedTuple):
     size: Whole
     scatter: float
 
-    def at(self, rows: Flags) -> Spots:
+    def at(self, rows: Flags) -> PlaceMedians:
         """Some of them; the scatter stays."""
-        return Spots(
-            self.anchor[rows],
-            self.place[rows],
-            self.value[rows],
-            self.gain[rows],
-            self.x[rows],
-            self.y[rows],
-            self.size[rows],
-            self.scatter,
-        )
+        return self._replace(**{key: each[rows] for key, each in self._asdict().items() if key != "scatter"})
 
 
-def spots(readings: Readings, slope: float) -> Spots:
-    """Readings of one anchor at one place together: medians about a line of ``slope``, told at their mean gain."""
+def place_medians(readings: Readings, slope: float) -> PlaceMedians:
+    """Readings of one anchor at one place together: medians about a line of ``slope``, at their mean gain."""
     key = readings.anchor * (int(readings.place.max()) + 1) + readings.place
     _, first, row, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
     order = np.argsort(row, kind="stable")
@@ -57,4 +48,5 @@ def spots(readings: Readings, slope: float) -> Spots:
     left = np.abs(level - middle[row])[count[row] > 1]
     fair = math.sqrt(float(count[count > 1].sum()) / max(float((count[count > 1] - 1).sum()), 1.0))
     scatter = NORMAL * fair * float(np.median(left)) if len(left) else 0.0
-    return Spots(readings.anchor[first], readings.place[first], middle + slope * gain, gain, x, y, count, scatter)
+    anchor, place = readings.anchor[first], readings.place[first]
+    return PlaceMedians(anchor, place, middle + slope * gain, gain, x, y, count, scatter)

@@ -10,24 +10,24 @@ from hypothesis import strategies as st
 from sensors.wifi.nl80211_message import Command, Message, decode
 from sensors.wifi.reading import (
     FRAME_STD_NS,
-    Heard,
     Part,
+    ScanEntry,
     Stamp,
     Window,
     betrays_end_stamping,
     fresh,
-    read_heard,
+    read_entries,
     read_ssid,
     stamped,
 )
 
 MS = 1_000_000
-RECORDINGS = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "wifi"
+RECORDINGS = Path(__file__).resolve().parents[4] / "shared" / "data" / "wifi"
 RECORDED = RECORDINGS / "nl80211_get_scan_hwsim_3ap_pos1_1.hex"
 
 
 def heard(time_ns, frequency_mhz=2412, bssid="02:00:00:00:01:00", *, is_exact=True):
-    return Heard(bssid, "ap", frequency_mhz, -50.0, time_ns, is_exact)
+    return ScanEntry(bssid, "ap", frequency_mhz, -50.0, time_ns, is_exact)
 
 
 def listed(**bss):
@@ -44,30 +44,30 @@ def recorded():
 
 
 def test_a_real_kernels_reply_is_read(recorded):
-    found = read_heard(recorded, 15_000_000_000)
+    found = read_entries(recorded, 15_000_000_000)
     assert found == [
-        Heard("02:00:00:00:01:00", "ap1", 2412, -23.0, 11279460612, is_exact=True),
-        Heard("02:00:00:00:02:00", "ap2", 2437, -36.0, 11375930280, is_exact=True),
-        Heard("02:00:00:00:03:00", "ap3", 2462, -34.0, 11577868164, is_exact=True),
+        ScanEntry("02:00:00:00:01:00", "ap1", 2412, -23.0, 11279460612, is_exact=True),
+        ScanEntry("02:00:00:00:02:00", "ap2", 2437, -36.0, 11375930280, is_exact=True),
+        ScanEntry("02:00:00:00:03:00", "ap3", 2462, -34.0, 11577868164, is_exact=True),
     ]
 
 
 def test_the_real_reply_is_stale_for_a_scan_that_began_after_it(recorded):
     """It was dumped three seconds after its scan: whoever begins now must not take it for fresh."""
     window = Window(14_000_000_000, 14_500_000_000)
-    assert fresh(read_heard(recorded, 15_000_000_000), window, 15_000_000_000) == Part(window, (), 3)
+    assert fresh(read_entries(recorded, 15_000_000_000), window, 15_000_000_000) == Part(window, (), 3)
 
 
 def test_without_a_boot_time_the_age_is_counted_back():
-    (one,) = read_heard([listed(BSSID=bytes(6), FREQUENCY=2412, SIGNAL_MBM=-5050, SEEN_MS_AGO=250)], 1000 * MS)
+    (one,) = read_entries([listed(BSSID=bytes(6), FREQUENCY=2412, SIGNAL_MBM=-5050, SEEN_MS_AGO=250)], 1000 * MS)
     assert (one.time_ns, one.is_exact, one.rssi_dbm) == (750 * MS, False, -50.5)
 
 
 def test_an_entry_without_strength_or_address_is_left_out():
     whole = {"BSSID": bytes(6), "FREQUENCY": 2412, "SIGNAL_MBM": -5000, "LAST_SEEN_BOOTTIME": 5}
     for missing in ("BSSID", "FREQUENCY", "SIGNAL_MBM"):
-        assert read_heard([listed(**{k: v for k, v in whole.items() if k != missing})], 10) == []
-    assert read_heard([Message(Command.NEW_SCAN_RESULTS, {"IFINDEX": 3})], 10) == []
+        assert read_entries([listed(**{k: v for k, v in whole.items() if k != missing})], 10) == []
+    assert read_entries([Message(Command.NEW_SCAN_RESULTS, {"IFINDEX": 3})], 10) == []
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_only_what_was_heard_in_the_window_counts():
     window = Window(1000 * MS, 1400 * MS)
     times = (900 * MS, 985 * MS, 1200 * MS, 1400 * MS, 1500 * MS, 1600 * MS)
     part = fresh([heard(time_ns) for time_ns in times], window, 1500 * MS)
-    assert [one.time_ns for one in part.heard] == [985 * MS, 1200 * MS, 1400 * MS, 1500 * MS]
+    assert [one.time_ns for one in part.entries] == [985 * MS, 1200 * MS, 1400 * MS, 1500 * MS]
     assert part.refused == 2, "one from before, one from the future"
 
 
