@@ -87,12 +87,11 @@ def assign(bag: Bag, world: World, topics: Mapping[str, str]) -> TopicAssignment
             _assign_named(assignment, bag, role, asked)
     if "odom" in assignment.topics and "wheels" in assignment.topics:
         raise ParameterError(f"{bag.path}: odom and wheels are both named, and would count the motion twice; leave one")
-    for name in assignment.used:
-        if assignment.used.count(name) > 1:
+    used = assignment.used
+    for name in used:
+        if used.count(name) > 1:
             raise ParameterError(f"{bag.path}: {name} is named for two roles; each needs a topic of its own")
-    free = [
-        topic for topic in bag.topics.values() if topic.count and topic.understood and topic.name not in assignment.used
-    ]
+    free = [topic for topic in bag.topics.values() if topic.count and topic.understood and topic.name not in used]
     _assign_by_type(assignment, bag, world, topics, free)
     if "wheels" in assignment.topics:
         assignment.joints = wheel_joints(assignment.topics["wheels"], assignment.joints, world.robot)

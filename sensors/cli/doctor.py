@@ -89,11 +89,7 @@ def _devices(sensor: Sensor, driver: Driver) -> Iterator[Advice]:
 
 def _clock() -> Iterator[Advice]:
     synced = is_clock_synced()
-    yield Advice(
-        synced,
-        f"the wall clock is {'' if synced else 'not '}synchronised by {'a' if synced else 'any'} service",
-        "timedatectl set-ntp true",
-    )
+    yield Advice(synced, f"the wall clock is {'' if synced else 'not '}synchronised", "timedatectl set-ntp true")
     has_clock = any(CLOCKS.glob("rtc*"))
     cure = "add a clock module; without one the date is wrong after a boot without network (stamps are not)"
     yield Advice(has_clock, f"this computer has {'a' if has_clock else 'no'} clock that runs while it is off", cure)
@@ -160,8 +156,6 @@ def _text(advices: Sequence[Advice]) -> str:
         lines.append(f"{'well' if advice.is_well else 'FIX '}  {advice.what}")
         if not advice.is_well and advice.cure:
             lines.append(f"      ↳ {advice.cure}")
-    ill = sum(not advice.is_well for advice in advices)
-    lines.append(
-        f"{len(advices) - ill} things are well, {ill} need attention" if ill else f"all {len(advices)} things are well"
-    )
+    well = sum(advice.is_well for advice in advices)
+    lines.append(f"{well} of {len(advices)} checks passed")
     return "\n".join(lines) + "\n"

@@ -143,9 +143,7 @@ class SensorLoop:
         failed = [status for status in statuses if status.state is State.FAILED]
         if failed and self._fail_fast:
             self.end(failed[0].error)
-        return Report(
-            statuses, {lifecycle.name: lifecycle.info for lifecycle in self._lifecycles if lifecycle.info is not None}
-        )
+        return Report(statuses, {one.name: one.info for one in self._lifecycles if one.info is not None})
 
 
 def check_duration(duration_s: float | None) -> None:

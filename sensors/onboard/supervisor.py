@@ -102,8 +102,7 @@ class Supervisor:
         self._news = threading.Event()
         self._taken_ns = 0
         self._threads = [
-            threading.Thread(target=self._serve, args=(lifecycle,), name=lifecycle.name, daemon=True)
-            for lifecycle in lifecycles
+            threading.Thread(target=self._serve, args=(one,), name=one.name, daemon=True) for one in lifecycles
         ]
 
     def __enter__(self) -> Supervisor:
