@@ -29,7 +29,7 @@ NODES = {
 REFERENCE_DISTANCE_M = 0.1
 """The runs stay within 0.1 to 3 m of the nodes, and the log-distance fit holds over all of it."""
 TIME_CORRELATION = 1.25
-"""Errors of neighbouring scans are alike: 1.6 times the fitted sigma in all, sqrt(1 + 1.25^2)."""
+"""Errors of neighbouring scans are correlated: 1.6 times the fitted sigma in all, sqrt(1 + 1.25^2)."""
 NOISE = {
     # 0.10 of a step of 0.1 m; 0.40 of a commanded turn of up to 0.8 rad in a second
     "distance_std_per_sqrt_m": 0.03,
@@ -117,8 +117,8 @@ def _odometry(rows: Sequence[Row]) -> list[Odometry]:
 
 def _scan(seq: int, row: Row) -> WifiScan:
     """Zero dBm or status 0 means no reading."""
-    heard = [node for node in NODES if row.number(f"rssi{node}") != 0.0 and row.number(f"status{node}") == 1.0]
-    readings = tuple(RssiReading(node, row.number(f"rssi{node}")) for node in heard)
+    received = [node for node in NODES if row.number(f"rssi{node}") != 0.0 and row.number(f"status{node}") == 1.0]
+    readings = tuple(RssiReading(node, row.number(f"rssi{node}")) for node in received)
     return WifiScan(_time_ns(row), "wifi", seq, readings)
 
 

@@ -39,7 +39,7 @@ PATH_LOSS = {
 }
 POOLED = (-46.8, 2.08, 7.03)
 TIME_CORRELATION = 1.25
-"""Errors of neighbouring readings are alike: 1.6 times the fitted sigma in all, sqrt(1 + 1.25^2)."""
+"""Errors of neighbouring readings are correlated: 1.6 times the fitted sigma in all, sqrt(1 + 1.25^2)."""
 RSSI_COLUMNS = {"rssi_3": "1", "rssi_4": "2", "rssi_5": "3", "rssi_8": "4", "rssi_10": "5", "rssi_11": "6"}
 NOISE = {
     # 0.20 of a step of 0.03 m; 0.40 of a commanded turn of 0.4 rad (a third of a second)
@@ -51,7 +51,7 @@ NOISE = {
     "turn_scale_std": 0.05,
 }
 LAST_GOOD_NS = 1628001747456333000
-"""Where the publication stops using the third run; what follows in that file is left out here too."""
+"""Time at which the publication stops using the third run; what follows in that file is left out here too."""
 
 
 def recordings(folder: Path) -> Iterator[Recording]:
@@ -94,8 +94,8 @@ def _truth(row: Row) -> Truth:
 
 
 def _scan(seq: int, row: Row) -> WifiScan:
-    heard = [(anchor, row.number(name)) for name, anchor in RSSI_COLUMNS.items() if row.text(name)]
-    return WifiScan(_time_ns(row), "ble", seq, tuple(RssiReading(anchor, rssi) for anchor, rssi in heard))
+    received = [(anchor, row.number(name)) for name, anchor in RSSI_COLUMNS.items() if row.text(name)]
+    return WifiScan(_time_ns(row), "ble", seq, tuple(RssiReading(anchor, rssi) for anchor, rssi in received))
 
 
 def _odometry(path: Path, start_ns: int, end_ns: int) -> list[Odometry]:

@@ -131,7 +131,7 @@ def _named(bag: Bag, role: str, name: str, kinds: tuple[str, ...]) -> Topic:
     topic = bag.topics[name]
     if topic.type in TRANSFORM_TYPES and role == "truth":
         pairs = ", ".join(sorted(topic.names))
-        raise ParameterError(f"{bag.path}: truth: {name} holds transforms ({pairs}); say which: {AS_FRAMES}")
+        raise ParameterError(f"{bag.path}: truth: {name} holds transforms ({pairs}); name one: {AS_FRAMES}")
     if topic.type not in kinds:
         raise ParameterError(f"{bag.path}: {role}: {name} is of the type {topic.type}, and not {' or '.join(kinds)}")
     if not topic.understood:
@@ -185,5 +185,5 @@ def _anchored(bag: Bag, anchors: set[str], free: Sequence[Topic]) -> list[tuple[
 
 def _ambiguous(bag: Bag, role: str, names: Sequence[str]) -> ParameterError:
     return ParameterError(
-        f"{bag.path}: {role} could be {' or '.join(names)}; say which with {role}={names[0]}, or {role}={NO_TOPIC}"
+        f"{bag.path}: {role} could be {' or '.join(names)}; choose one with {role}={names[0]}, or {role}={NO_TOPIC}"
     )
