@@ -65,14 +65,14 @@ def radio_readings(world: World, scan: WifiScan | Ranges) -> tuple[RadioReading,
 
     A range's variance is the larger of the world's and the device's own: devices are optimists.
     """
-    found: list[RadioReading] = []
+    readings: list[RadioReading] = []
     for reading in scan.readings:
         anchor = world.anchor(reading.anchor)
         if anchor is None:
             continue
         if isinstance(reading, RssiReading):
-            found.append(RadioReading(anchor, anchor.radio, reading.rssi_dbm, anchor.radio.std**2))
+            readings.append(RadioReading(anchor, anchor.radio, reading.rssi_dbm, anchor.radio.std**2))
         else:
             std = max(anchor.ranging.std, reading.std_m or 0.0)
-            found.append(RadioReading(anchor, anchor.ranging, reading.range_m, std**2))
-    return tuple(found)
+            readings.append(RadioReading(anchor, anchor.ranging, reading.range_m, std**2))
+    return tuple(readings)

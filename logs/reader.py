@@ -141,22 +141,25 @@ def _take_prior(contents: _Contents, data: bytes) -> None:
 
 
 def _warnings(path: Path, contents: _Contents, world: World) -> tuple[str, ...]:
-    found = []
+    warnings = []
     if contents.record.get("world_hash", world.hash) != world.hash:
-        found.append(f"{path}: the world stored in it is not the one it was written with; its hash differs")
+        warnings.append(f"{path}: the world stored in it is not the one it was written with; its hash differs")
     uncounted = left_out([truth.position_known for truth in contents.truths])
-    found += [f"{path}: {sentence}" for sentence in (*contents.refused, *uncounted)]
-    found += [f"{path}: {count} messages of {topic} cannot be decoded" for topic, count in contents.unreadable.items()]
-    found += [f"{path}: {count} messages of {topic} are of no use here" for topic, count in contents.foreign.items()]
+    warnings += [f"{path}: {sentence}" for sentence in (*contents.refused, *uncounted)]
+    warnings += [
+        f"{path}: {count} messages of {topic} cannot be decoded" for topic, count in contents.unreadable.items()
+    ]
+    warnings += [f"{path}: {count} messages of {topic} are of no use here" for topic, count in contents.foreign.items()]
     if not contents.measurements:
-        found.append(f"{path}: holds no measurements")
-    return tuple(found)
+        warnings.append(f"{path}: holds no measurements")
+    return tuple(warnings)
 
 
 def _cautions(path: Path, contents: _Contents, world: World) -> Iterator[str]:
     """Warnings of a run that is misleading though all of it can be read."""
     measurements = [measurement for _, measurement in contents.measurements]
-    if found := caution_of_run(world.robot, measurements, contents.diagnostics):
+    if caution := caution_of_run(world.robot, measurements, contents.diagnostics):
         # A later part of a recording begins with a command that stands in an earlier one.
-        is_part = contents.record.get("split", "0") != "0"
-        yield f"{path}: {found._replace(cure='join the parts of the recording (`fusion join`)') if is_part else found}"
+        if contents.record.get("split", "0") != "0":
+            caution = caution._replace(cure="join the parts of the recording (`fusion join`)")
+        yield f"{path}: {caution}"

@@ -105,9 +105,9 @@ def _describes_itself(made: type[Any]) -> None:
 
 @_promise("discovers_quietly", "looking for devices on any machine must end well", plays=False)
 def _discovers_quietly(made: type[Any]) -> None:
-    found = made.discover()
-    require(isinstance(found, list), f"discover answered {found!r}, not a list")
-    strangers = [one for one in found if not isinstance(one, Found)]
+    devices = made.discover()
+    require(isinstance(devices, list), f"discover answered {devices!r}, not a list")
+    strangers = [one for one in devices if not isinstance(one, Found)]
     require(not strangers, f"discover found {strangers}, which are no Found")
 
 

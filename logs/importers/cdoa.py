@@ -106,13 +106,13 @@ def _time_ns(row: Row) -> int:
 
 def _odometry(rows: Sequence[Row]) -> list[Odometry]:
     """Distance from the encoder; turn from the mean of the commands at both ends of a row's second."""
-    found = []
+    increments = []
     for i, (before, row) in enumerate(itertools.pairwise(rows)):
         start, time_ns = _time_ns(before), _time_ns(row)
         distance = DISTANCE_SCALE * (row.number("robot_odom_x") - before.number("robot_odom_x"))
         turn = 0.5 * (row.number("vel_w") + before.number("vel_w")) * seconds(time_ns - start)
-        found.append(Odometry(time_ns, "odometry", i, start, distance, turn))
-    return found
+        increments.append(Odometry(time_ns, "odometry", i, start, distance, turn))
+    return increments
 
 
 def _scan(seq: int, row: Row) -> WifiScan:
@@ -124,11 +124,11 @@ def _scan(seq: int, row: Row) -> WifiScan:
 
 def _truths(rows: Sequence[Row]) -> list[Truth]:
     """Positions, but for rows in which the camera froze while the encoder moved."""
-    found = []
+    truths = []
     for before, row in zip([rows[0], *rows], rows, strict=False):
         here = (row.number("robot_pos_x"), row.number("robot_pos_y"))
         still = here == (before.number("robot_pos_x"), before.number("robot_pos_y")) and row is not before
         moved = abs(row.number("robot_odom_x") - before.number("robot_odom_x")) > FROZEN_M
         if not (still and moved):
-            found.append(Truth(_time_ns(row), *here))
-    return found
+            truths.append(Truth(_time_ns(row), *here))
+    return truths

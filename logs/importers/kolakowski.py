@@ -104,7 +104,7 @@ def _odometry(path: Path, start_ns: int, end_ns: int) -> list[Odometry]:
     edges = {start_ns, end_ns, *(time for time, _ in commands if start_ns < time < end_ns)}
     edges.update(range(start_ns, end_ns, STEP_NS))
     times = sorted(edges)
-    found, current = [], "stop"
+    increments, current = [], "stop"
     upcoming = iter([*commands, (end_ns + 1, "stop")])
     following = next(upcoming)
     for i, (before, time) in enumerate(itertools.pairwise(times)):
@@ -113,8 +113,8 @@ def _odometry(path: Path, start_ns: int, end_ns: int) -> list[Odometry]:
             following = next(upcoming, (end_ns + 1, "stop"))
         speed, rate = SPEEDS[current]
         span_s = seconds(time - before)
-        found.append(Odometry(time, "commands", i, before, speed * span_s, rate * span_s))
-    return found
+        increments.append(Odometry(time, "commands", i, before, speed * span_s, rate * span_s))
+    return increments
 
 
 def _commands(path: Path) -> list[tuple[int, str]]:
@@ -122,15 +122,15 @@ def _commands(path: Path) -> list[tuple[int, str]]:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise RecordingError(f"{path}: cannot be read ({error}); it belongs beside the _df.csv") from error
-    found = []
+    commands = []
     for number, line in enumerate(lines, 1):
         parts = line.split(",")
         if not line.strip():
             continue
         if len(parts) < 2 or parts[1] not in SPEEDS:
             raise RecordingError(f"{path}:{number}: {line!r} is no command; expected time,{'|'.join(SPEEDS)},speed")
-        found.append((exact_ns(parts[0], f"{path}:{number}"), parts[1]))
-    return found
+        commands.append((exact_ns(parts[0], f"{path}:{number}"), parts[1]))
+    return commands
 
 
 def _world(name: str, path: Path, drive: str) -> World:

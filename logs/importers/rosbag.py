@@ -42,16 +42,16 @@ def read_bag(
     the truth in the map (x [m], y [m], heading [rad]). Raises `LogError` for what holds no run, `ParameterError` for a
     role or topic that there is not, or that could be several.
     """
-    found = read_recording(path, world, topics, truth_to_map=truth_to_map)
+    recording = read_recording(path, world, topics, truth_to_map=truth_to_map)
     return Run(
         path=path,
-        name=found.name,
+        name=recording.name,
         world=world,
-        prior=found.prior,
-        metadata=found.metadata,
-        measurements=tuple(found.measurements),
-        truth=TruthTrack.from_truths(found.truths) or None,
-        warnings=tuple(found.doubts),
+        prior=recording.prior,
+        metadata=recording.metadata,
+        measurements=tuple(recording.measurements),
+        truth=TruthTrack.from_truths(recording.truths) or None,
+        warnings=tuple(recording.doubts),
         lanes={},
     )
 
@@ -142,9 +142,9 @@ def _measurements(bag: Bag, assignment: TopicAssignment, world: World) -> tuple[
             rows += _radio(topic, "")
         elif role != "truth":
             wheels = role == "wheels"
-            found = wheel_increments(topic, assignment.joints, world.robot) if wheels else pose_increments(topic)
-            rows += found.rows
-            warnings += found.warnings
+            increments = wheel_increments(topic, assignment.joints, world.robot) if wheels else pose_increments(topic)
+            rows += increments.rows
+            warnings += increments.warnings
     for name, anchor in assignment.ranges:
         rows += _radio(bag.topics[name], anchor)
     return rows, warnings

@@ -75,11 +75,11 @@ def _pose(data: bytes, *, has_child: bool = False) -> list[Sample]:
 
 def _transforms(data: bytes) -> list[Sample]:
     cursor = Unpacker(data)
-    found: list[Sample] = []
+    samples: list[Sample] = []
     for _ in range(cursor.whole()):
         (time_ns, parent), child = take_header(cursor), cursor.text()
-        found.append(pose_sample(time_ns, parent, child, *take_pose(cursor)))
-    return found
+        samples.append(pose_sample(time_ns, parent, child, *take_pose(cursor)))
+    return samples
 
 
 def _joints(data: bytes) -> list[Sample]:
