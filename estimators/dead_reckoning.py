@@ -27,7 +27,7 @@ from fusion.belief import HEADING_KNOWN_STD, starting_belief
 
 
 class State(NamedTuple):
-    """Where the run started, and the whole drive since as one increment."""
+    """The start of the run, and the whole motion since as one increment."""
 
     pose: Pose
     covariance: Covariance

@@ -2,9 +2,9 @@
 
 The state is (x, y, heading), then whichever of these the world gives a standard deviation: the relative error of
 distance, the relative error of turn, the bias of the turn rate, and the common error of each anchor's readings. An
-anchor's error is a first-order Gauss-Markov process in the path driven (Gudmundson 1991: shadowing stays alike over a
-correlation distance), which also covers a constant offset. Motion is composed once per radio epoch from the
-pre-integrated increment; readings enter one at a time, all linearised and gated at the belief before the scan, so
+anchor's error is a first-order Gauss-Markov process in the path driven (Gudmundson 1991: shadowing stays correlated
+over a path), which also covers a constant offset. Motion is composed once per radio epoch from the pre-integrated
+increment; readings enter one at a time, all linearised and gated at the belief before the scan, so
 their order does not matter (Bar-Shalom, Li & Kirubarajan 2001, section 5.4 and eq. 5.4.2-13 for the gate).
 """
 
@@ -65,9 +65,9 @@ class Ekf:
         Whether each anchor's common error is a state. Off, its variance is added to that of every reading. A range
         offset belongs to the radio and is well worth a state. Shadowing belongs to the place, and where it is only
         guessed over what path, such states explain away the readings that would correct the heading. None: where the
-        world tells its `shadowing_length_m`.
+        world states its `shadowing_length_m`.
     rssi_bias_length_m, range_bias_length_m
-        Path after which an anchor's common error is forgotten by 1/e [m], where the world does not tell: shadowing
+        Path after which an anchor's common error is forgotten by 1/e [m], where the world states none: shadowing
         belongs to the place, a range offset to the radio.
     max_correlated
         How many neighbouring readings of an anchor at most are taken to share one error, where that is not a state. 1
@@ -114,11 +114,11 @@ class Ekf:
         kept_m = []
         wanted = {PathLoss: estimate_rssi_bias, Ranging: estimate_range_bias}
         for anchor_id, model in models:
-            told, asked = model.bias_length_m, wanted[type(model)]
-            if model.bias_std > 0.0 and (told is not None if asked is None else asked):
+            known_m, asked = model.bias_length_m, wanted[type(model)]
+            if model.bias_std > 0.0 and (known_m is not None if asked is None else asked):
                 self._bias_index[anchor_id, type(model)] = 3 + len(stds)
                 stds.append(model.bias_std)
-                kept_m.append(told or self._lengths_m[type(model)])
+                kept_m.append(known_m or self._lengths_m[type(model)])
         self._extra_variance = np.square(np.array(stds))
         self._bias_length_m = np.array(kept_m)
 

@@ -55,7 +55,7 @@ class State(NamedTuple):
 
 
 class FilterpyFilter(ABC):
-    """The contract, kept for any Gaussian filter of filterpy; a subclass says how it predicts and updates."""
+    """The contract, kept for any Gaussian filter of filterpy; a subclass defines prediction and update."""
 
     tags: ClassVar[frozenset[Tag]] = frozenset({Tag.HEADING_START})
 
@@ -72,7 +72,7 @@ class FilterpyFilter(ABC):
 
     @abstractmethod
     def _expected(self, belief: Any, readings: Readings) -> tuple[Floats, Floats]:  # noqa: ANN401
-        """What ``belief`` expects of each reading, and how uncertain it is of that; both (m,)."""
+        """Expected reading and its variance by the ``belief`` alone, of each of ``readings``; both (m,)."""
 
     @abstractmethod
     def _correct(self, belief: Any, readings: Readings, noise: Floats) -> None:  # noqa: ANN401

@@ -1,4 +1,4 @@
-"""Trilateration without memory or motion: what radio alone says (Moro & Mehrpouyan 2019, eqs. 1 and 2)."""
+"""Trilateration without memory or motion: the position by radio alone (Moro & Mehrpouyan 2019, eqs. 1 and 2)."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class RadioOnly:
     Parameters
     ----------
     window_s
-        How long a reading is remembered until readings of other anchors join it [s]. Radios that hear one anchor at a
-        time need it; a Wi-Fi scan hears all at once.
+        How long a reading is remembered until readings of other anchors join it [s]. Radios that range to one anchor
+        at a time need it; a Wi-Fi scan measures all at once.
     clamp_to_bounds
         Whether a fix beyond the floor is moved to its edge.
     """
@@ -61,11 +61,11 @@ class RadioOnly:
         self._clamp = clamp_to_bounds
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - a memoryless method has no prior
-        """Nothing heard yet."""
+        """No reading yet."""
         return State((), None, prior.time_ns)
 
     def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:  # noqa: ARG002
-        """Make a fix from what was heard lately, if three anchors were."""
+        """Make a fix from the latest readings, if they are of three anchors at least."""
         if scan is None:
             return state, ()
         recent = remember(state.recent, scan.time_ns, radio_readings(self._world, scan), self._window_ns)

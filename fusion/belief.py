@@ -1,4 +1,4 @@
-"""How a Gaussian belief starts when the prior leaves position or heading open."""
+"""Gaussian beliefs at the start, where the prior may leave position or heading open."""
 
 from __future__ import annotations
 

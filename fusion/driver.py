@@ -1,7 +1,7 @@
 """The contract every driver keeps: four methods around one device, and what can be known of it without the device.
 
 A driver is a class built as ``Class(name, clock, **settings)``; building one touches no device. It never reconnects by
-itself, never sleeps longer than it is told to, never repeats an old value: whoever runs it
+itself, never sleeps longer than it is asked to, never repeats an old value: whoever runs it
 (`sensors.onboard.driver_lifecycle`) owns retries, watchdog and threads. Parsing is pure functions of bytes, apart from
 the driver. `docs/drivers.md` shows how.
 """
@@ -18,7 +18,7 @@ from fusion.values import Measurement, Truth, nanoseconds
 
 
 class Needs(NamedTuple):
-    """What a user must have before the device opens; `fusion doctor` checks each and prints its cure."""
+    """Requirements before the device opens; `fusion doctor` checks each and prints its cure."""
 
     capabilities: tuple[str, ...] = ()
     """Linux capabilities, as ``CAP_NET_ADMIN``."""
@@ -29,7 +29,7 @@ class Needs(NamedTuple):
 
 
 class DriverSpec(NamedTuple):
-    """What a driver delivers, by its settings; readable without hardware.
+    """Output of a driver, by its settings; readable without hardware.
 
     ``least_hz`` is the rate [Hz] below which the sensor counts as silent: the watchdog waits for three periods of it,
     a second at least. Zero: it speaks only when something happens, and no silence is too long.
@@ -50,7 +50,7 @@ class Found(NamedTuple):
 
 
 class DeviceInfo(NamedTuple):
-    """What an open device says of itself; ``settings`` as read back from it, not as asked for."""
+    """Description that an open device gives of itself; ``settings`` as read back from it, not as asked for."""
 
     model: str
     serial: str = ""
@@ -75,7 +75,7 @@ class Advice(NamedTuple):
 
 @unique
 class Level(Enum):
-    """How much a diagnostic matters; the values are those of diagnostic_msgs/DiagnosticStatus."""
+    """Severity of a diagnostic; the values are those of diagnostic_msgs/DiagnosticStatus."""
 
     OK = 0
     WARN = 1
@@ -83,7 +83,7 @@ class Level(Enum):
 
 
 class Diagnostic(NamedTuple):
-    """What a device says that is no measurement: an aborted scan, a failed ranging, its own position, a temperature.
+    """A report of a device that is no measurement: an aborted scan, a failed ranging, its own position, a temperature.
 
     Kept in the log; no estimator sees it. ``values`` are names with numbers or words.
     """
@@ -96,12 +96,12 @@ class Diagnostic(NamedTuple):
 
 
 DriverOutput: TypeAlias = Measurement | Truth | Diagnostic
-"""What a driver hands over. Only a simulated robot knows the `Truth`."""
+"""One item from a poll. Only a simulated robot knows the `Truth`."""
 
 
 @runtime_checkable
 class Clock(Hashable, Protocol):
-    """Where time comes from: CLOCK_BOOTTIME on a robot, a virtual one in a test."""
+    """A source of time: CLOCK_BOOTTIME on a robot, a virtual one in a test."""
 
     def now_ns(self) -> int:
         """Nanoseconds since boot, never backwards."""
@@ -151,12 +151,13 @@ class Driver(Protocol):
 
     def open(self) -> DeviceInfo:
         """All or nothing: afterwards the device is running with its settings read back, or all is as before and a
-        `DriverError` says why. Closed drivers may be opened again.
+        `DriverError` states why. Closed drivers may be opened again.
         """
 
     def poll(self, timeout_s: float) -> Sequence[DriverOutput]:
-        """What came, waiting at most about ``timeout_s``; empty when nothing did. A reading that cannot be understood
-        costs that reading alone and is told as a `Diagnostic`. Raises `DeviceLostError` when the device is gone.
+        """Output that arrived, waiting at most about ``timeout_s``; empty when none did. A reading that cannot be
+        understood costs that reading alone and is reported as a `Diagnostic`. Raises `DeviceLostError` when the device
+        is gone.
         """
 
     def close(self) -> None:
@@ -170,15 +171,15 @@ class FakeDevice(Protocol):
     """
 
     settings: Mapping[str, object]
-    """What to build the driver with, so that it opens this device."""
+    """Settings of the driver with which it opens this device."""
     clock: Clock
     """The clock to build it with."""
 
     def speak(self) -> None:
-        """Let the device say one whole thing: at least one measurement comes out of the next polls."""
+        """Let the device send one whole message: at least one measurement comes out of the next polls."""
 
     def garble(self) -> None:
-        """Let it say something that nobody understands."""
+        """Let it send bytes that cannot be understood."""
 
     def unplug(self) -> None:
         """Take it away."""

@@ -21,7 +21,7 @@ from fusion.world import World
 
 
 class Longest(NamedTuple):
-    """Where a stretch of motion without radio is closed: the first of these that it reaches.
+    """Limits at which a stretch of motion without radio is closed: the first of these that it reaches.
 
     At 5 % error of every turn, or a bias of 0.01 rad/s, the heading is then off by some 0.3 rad, and what first order
     leaves out is less than 5 % of the displacement.
@@ -50,7 +50,7 @@ class Epoch(NamedTuple):
 
 
 class FrontEndState(NamedTuple):
-    """What the front end remembers: the odometer, and the motion since the last epoch."""
+    """Memory of the front end: the odometer, and the motion since the last epoch."""
 
     odometer: OdometerState
     motion: Increment

@@ -12,7 +12,7 @@
     ├── SuiteError        a suite of benchmarks contradicts itself         → edit the suite file
     ├── ConformanceError  an estimator breaks a promise of the contract    → fix the estimator
     ├── ViewerError       the Rerun viewer cannot be used here             → install what the message names
-    └── DriverError       a sensor cannot be used now                      → do what its ``hint`` says
+    └── DriverError       a sensor cannot be used now                      → follow its ``hint``
         ├── SettingError           a setting is refused, by us or by the device  → correct the robot file
         ├── DependencyError        a package or tool is missing                  → install it
         ├── UnsupportedError       the device or kernel cannot do this           → another device or backend
@@ -20,9 +20,9 @@
         ├── NotFoundError          the device is not there                       → plug it in; we go on looking
         ├── BusyError              somebody else has it                          → stop that one; we go on trying
         ├── DeviceLostError        it was there and went away                    → nothing; we go on trying
-        └── ProtocolError          it says what nobody understands               → check firmware and wiring
+        └── ProtocolError          its bytes cannot be understood                → check firmware and wiring
 
-``except FusionError`` catches them all. A message says what, which value, where, and what to do next.
+``except FusionError`` catches them all. A message states what, which value, where, and what to do next.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ class DeviceLostError(DriverError):
 
 
 class ProtocolError(DriverError):
-    """The device says what nobody understands."""
+    """The device sends what cannot be understood."""
 
     passes = True
 

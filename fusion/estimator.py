@@ -23,7 +23,7 @@ State_contra = TypeVar("State_contra", contravariant=True)
 
 @unique
 class Tag(Enum):
-    """What a method is, as far as the host and the conformance kit must know."""
+    """Properties of a method that the host and the conformance kit must know."""
 
     STOCHASTIC = "stochastic"
     """Draws random numbers: another seed gives another answer."""
@@ -43,7 +43,7 @@ class Tag(Enum):
 
 @runtime_checkable
 class Estimator(Protocol[State]):
-    """What the host calls, epoch by epoch: a stretch of motion, and the radio scan at its end.
+    """Functions that the host calls, epoch by epoch: a stretch of motion, and the radio scan at its end.
 
     The host has screened the readings, put them in order and integrated the motion, the same for every estimator; a
     state is the belief at its own moment, the last epoch's, and ``motion`` is always what followed it.
@@ -75,13 +75,13 @@ class Particles(NamedTuple):
 
     @property
     def effective_number(self) -> float:
-        """How many of them count, 1 / Σ weight² (Kong, Liu & Wong 1994): from 1 to n."""
+        """Effective number of them, 1 / Σ weight² (Kong, Liu & Wong 1994): from 1 to n."""
         return 1.0 / float(self.weights @ self.weights)
 
 
 @runtime_checkable
 class ParticleEstimator(Protocol[State_contra]):
-    """What an estimator may offer beside the contract when its belief is made of points, so that they can be looked
+    """Optional part of the contract for an estimator whose belief is made of points, so that they can be looked
     at. Nothing depends on it.
     """
 

@@ -92,7 +92,7 @@ class Covariance(NamedTuple):
         )
 
     def flaw(self, known: tuple[bool, bool, bool] = (True, True, True)) -> str:
-        """Why this is no covariance of those of (x, y, heading) that are ``known``; "" where it is one.
+        """The reason why this is no covariance of those of (x, y, heading) that are ``known``; "" where it is one.
 
         A matrix is positive semi-definite when no principal minor is negative. They are those of the correlations
         here, which have no unit, so that one bound on rounding fits all.

@@ -70,7 +70,7 @@ def wheel_increment(robot: Robot, rolled_m: Sequence[float]) -> tuple[float, flo
 
 
 def since(start_ns: int, odometry: Odometry) -> Odometry:
-    """What an increment that ends after ``start_ns`` tells of the time from there on, its twist taken as steady.
+    """The part of an increment from ``start_ns`` on, its twist taken as steady.
 
     >>> since(60, Odometry(100, "wheels", 0, from_ns=0, distance_m=0.5, turn_rad=1.0)).distance_m
     0.2
@@ -94,7 +94,7 @@ class _GyroAngle(NamedTuple):
 
 
 class OdometerState(NamedTuple):
-    """What the odometer remembers. ``start_ns``: motion before it is none of this run's; ``covered_ns``: motion is
+    """Memory of the odometer. ``start_ns``: motion before it is none of this run's; ``covered_ns``: motion is
     accounted for up to here.
     """
 
@@ -169,7 +169,7 @@ class Odometer:
         wheels = len(WHEELS[self.robot.drive])
         if count != wheels:
             raise MeasurementError(
-                f"{type(measurement).__name__} of {measurement.sensor!r} at {measurement.time_ns} ns tells of {count} "
+                f"{type(measurement).__name__} of {measurement.sensor!r} at {measurement.time_ns} ns has {count} "
                 f"wheels, the world's {self.robot.drive} drive has {wheels}; correct robot.drive, or the driver"
             )
 

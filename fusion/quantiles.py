@@ -11,7 +11,7 @@ from fusion.arrays import Flags, Floats
 
 
 def known(values: Floats) -> Floats:
-    """Those that are not NaN; most often that is all of them, which a sum tells fastest."""
+    """Those that are not NaN; most often that is all of them, which a sum shows fastest."""
     return values[~np.isnan(values)] if math.isnan(np.add.reduce(values)) else values
 
 
@@ -87,7 +87,7 @@ def _between(low: float, high: float, part: float) -> float:
 
 
 class Ordered(NamedTuple):
-    """Values in order, (n,), for several quantiles. With weights, ``stands`` (n,) says at what part of the way from
+    """Values in order, (n,), for several quantiles. With weights, ``stands`` (n,) is the part of the way from
     the first to the last each one stands.
     """
 

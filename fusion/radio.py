@@ -1,11 +1,11 @@
-"""What a radio reading says about distance, both ways.
+"""Models of radio readings by distance, and their inverses.
 
 Signal strength follows the close-in free-space reference path-loss model (Moro & Mehrpouyan 2019, eqs. 3 and 4;
 Rappaport et al. 2015):
 
     PL(d) = PL(d0) + 10 n log10(d / d0) + X_sigma    for d >= d0        PL(d0) = 20 log10(4 pi d0 / lambda)
 
-Below the reference distance d0 the model says nothing. Here the loss is held at PL(d0), so the expected RSSI is
+Below the reference distance d0 the model is not defined. Here the loss is held at PL(d0), so the expected RSSI is
 constant, its slope zero, and the inverse never answers less than d0.
 
 Ranges follow a line: measured = scale * distance + offset. Functions take floats or arrays of any one shape.
@@ -35,7 +35,7 @@ def free_space_loss_db(distance_m: float, frequency_hz: float) -> float:
 
 
 class DistanceModel(Protocol):
-    """How one anchor's reading depends on the distance between the two antennas."""
+    """Dependence of one anchor's reading on the distance between the two antennas."""
 
     @property
     def std(self) -> float:
@@ -43,7 +43,7 @@ class DistanceModel(Protocol):
 
     @property
     def bias_std(self) -> float:
-        """How far all readings of one anchor may be off together, one standard deviation, in the reading's unit."""
+        """Standard deviation of the error that all readings of one anchor share [the reading's unit]."""
 
     def expected(self, distance_m: ArrayLike) -> Floats:
         """The reading expected at ``distance_m``."""
@@ -60,7 +60,7 @@ class DistanceModel(Protocol):
 
     @property
     def gain_std(self) -> float:
-        """How far the dependence on distance may be off for all anchors together, one standard deviation."""
+        """Standard deviation of the error of the gain that all anchors share."""
 
     def by_gain(self, distance_m: ArrayLike) -> Floats:
         """Derivative of ``expected`` by that common error."""
@@ -82,7 +82,7 @@ class PathLoss:
     shadowing_std_db: float = 4.0
     bias_std_db: float = 4.0
     shadowing_length_m: float | None = None
-    """Over this path shadowing stays alike, down to 1/e (Gudmundson 1991) [m]; None: not known."""
+    """Over this path shadowing stays correlated, down to 1/e (Gudmundson 1991) [m]; None: not known."""
     exponent_std: float = 0.0
 
     @property
@@ -169,7 +169,7 @@ class Ranging:
 
     @property
     def bias_length_m(self) -> None:
-        """Never told: an offset belongs to the radio."""
+        """None: an offset belongs to the radio, not to a place."""
         return None
 
     @property

@@ -1,4 +1,4 @@
-"""Radio readings as every filter wants them: one scalar at a time, with what the world expects of it."""
+"""Radio readings for filters: one scalar at a time, with the reading that the world expects."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class RadioReading(NamedTuple):
     variance: float
 
     def expect(self, x: float, y: float, heading: float, antenna_m: tuple[float, float, float]) -> Expectation:
-        """What the anchor should read with the robot's base at (x, y, heading), its antenna at ``antenna_m`` on it."""
+        """Expected reading with the robot's base at (x, y, heading), its antenna at ``antenna_m`` on it."""
         c, s = math.cos(heading), math.sin(heading)
         arm_x, arm_y = c * antenna_m[0] - s * antenna_m[1], s * antenna_m[0] + c * antenna_m[1]
         dx, dy, dz = x + arm_x - self.anchor.x, y + arm_y - self.anchor.y, antenna_m[2] - self.anchor.z
@@ -65,14 +65,14 @@ def radio_readings(world: World, scan: WifiScan | Ranges) -> tuple[RadioReading,
 
     A range's variance is the larger of the world's and the device's own: devices are optimists.
     """
-    found: list[RadioReading] = []
+    readings: list[RadioReading] = []
     for reading in scan.readings:
         anchor = world.anchor(reading.anchor)
         if anchor is None:
             continue
         if isinstance(reading, RssiReading):
-            found.append(RadioReading(anchor, anchor.radio, reading.rssi_dbm, anchor.radio.std**2))
+            readings.append(RadioReading(anchor, anchor.radio, reading.rssi_dbm, anchor.radio.std**2))
         else:
             std = max(anchor.ranging.std, reading.std_m or 0.0)
-            found.append(RadioReading(anchor, anchor.ranging, reading.range_m, std**2))
-    return tuple(found)
+            readings.append(RadioReading(anchor, anchor.ranging, reading.range_m, std**2))
+    return tuple(readings)

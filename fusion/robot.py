@@ -28,7 +28,7 @@ POSITIVE = (
 
 @dataclass(frozen=True, slots=True)
 class OdometryNoise:
-    """How far odometry strays: white noise whose variance grows with path, turn and time, whatever the message rate
+    """Errors of odometry: white noise whose variance grows with path, turn and time, whatever the message rate
     (after Thrun, Burgard & Fox 2005, table 5.6), and the calibration errors that stay the same for a whole run.
     """
 

@@ -1,4 +1,4 @@
-"""Readings that no estimator should see, taken out once for all of them, each with a Fate that says why."""
+"""Readings that no estimator should see, taken out once for all of them, each with a Fate that states why."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from fusion.values import (
 from fusion.world import World
 
 MAX_READING_AGE_NS = nanoseconds(3.0)
-"""Oldest reading of a scan still taken: a radio may list an anchor long after it was last heard."""
+"""Oldest reading of a scan still taken: a radio may list an anchor long after it last received it."""
 RSSI_RANGE_DBM = (-120.0, 20.0)
-"""Signal strengths a receiver can report; others are codes for "nothing heard", such as 0 x 256 or 127."""
+"""Signal strengths a receiver can report; others are codes for "nothing received", such as 0 x 256 or 127."""
 
 
 def screen(world: World, measurement: Measurement) -> tuple[Measurement | None, tuple[Fate, ...]]:

@@ -21,7 +21,7 @@ from fusion.values import Decision, Fate, Measurement, Odometry, Ranges, Reason,
 from fusion.world import World
 
 HORIZON_S = 2.0
-"""How late a measurement may be and still be put in its place."""
+"""Largest delay of a measurement that is still put in its place."""
 MAX_JUMP_NS = nanoseconds(3600.0)
 """A stamp further ahead than this is believed only when the next one agrees."""
 
@@ -105,7 +105,7 @@ class Timeline:
         return self._insert(key, measurement)
 
     def _refusal(self, measurement: Measurement, key: Key) -> tuple[Fate, ...] | None:
-        """Why the stamp of a measurement keeps it out, or None."""
+        """The reason why the stamp of a measurement keeps it out, or None."""
         newest_ns = self.time_ns
         jumped = measurement.time_ns - newest_ns > MAX_JUMP_NS
         if jumped and (self._suspect_ns is None or abs(measurement.time_ns - self._suspect_ns) > MAX_JUMP_NS):

@@ -1,6 +1,6 @@
 """The values that flow through the house: measurements in, estimates and fates out.
 
-All are small and immutable, in SI units and radians, with time in integer nanoseconds. ``time_ns`` says when a
+All are small and immutable, in SI units and radians, with time in integer nanoseconds. ``time_ns`` is when a
 measurement was true. ``sensor`` and ``seq`` identify it: the pair is unique within a run at one ``time_ns``.
 """
 
@@ -41,7 +41,7 @@ class WheelTicks:
 
 @dataclass(frozen=True, slots=True)
 class MotorCommand:
-    """What the motors were told: signed speed of each wheel [m/s]. Gives single-channel encoders their sign."""
+    """Commanded speed of each wheel, signed [m/s]. Gives single-channel encoders their sign."""
 
     time_ns: int
     sensor: str
@@ -88,7 +88,7 @@ class RssiReading(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class WifiScan:
-    """Signal strengths heard in one scan (Wi-Fi or BLE)."""
+    """Signal strengths received in one scan (Wi-Fi or BLE)."""
 
     time_ns: int
     sensor: str
@@ -120,7 +120,7 @@ Measurement: TypeAlias = WheelTicks | MotorCommand | Odometry | Gyro | WifiScan 
 
 
 class Truth(NamedTuple):
-    """Where the robot really was: a stream of its own that no estimator ever sees.
+    """True pose of the robot: a stream of its own that no estimator ever sees.
 
     A heading that is None or not finite is not known, nor is a position of which a coordinate is not finite.
     """
@@ -143,7 +143,7 @@ class Truth(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Prior:
-    """What is known before the first measurement. What is not known counts as uniform, whatever its numbers: they may
+    """Knowledge before the first measurement. What is not known counts as uniform, whatever its numbers: they may
     be NaN. Raises `BeliefError` where the others are not finite, or no covariance.
     """
 
@@ -166,7 +166,7 @@ class Prior:
 
 
 class Estimate(NamedTuple):
-    """Where an estimator says the robot is.
+    """Pose of the robot by an estimator.
 
     ``covariance`` is None where the method claims none. ``valid`` False means "do not use this pose".
     ``p_lost`` is the estimator's own probability that it is lost, None without an opinion. ``reset_count`` rises
@@ -185,7 +185,7 @@ class Estimate(NamedTuple):
 
 @unique
 class Decision(Enum):
-    """What became of a reading."""
+    """Decision on a reading."""
 
     USED = "used"
     DOWNWEIGHTED = "downweighted"
@@ -196,7 +196,7 @@ class Decision(Enum):
 
 @unique
 class Reason(Enum):
-    """Why; a closed list. The host writes those of the second group."""
+    """Reason of a decision; a closed list. The host writes those of the second group."""
 
     OK = "ok"
     ROBUST_LOSS = "robust_loss"
@@ -218,7 +218,7 @@ class Reason(Enum):
 
 
 class Fate(NamedTuple):
-    """What became of one reading: one per anchor in a scan, one for every other measurement that is not plain motion.
+    """Decision on one reading: one per anchor in a scan, one for every other measurement that is not plain motion.
 
     ``anchor`` is "" for a measurement without anchors. ``weight`` in [0, 1] is the share of the reading's nominal
     information that entered the state. ``innovation`` is measurement minus prediction from the belief *before* the

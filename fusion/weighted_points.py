@@ -1,4 +1,4 @@
-"""What the filters share that hold their belief as points: the spread of points, and a likelihood that forgives.
+"""Beliefs held as weighted points: their moments and motion, and a likelihood that is robust.
 
 The likelihood of a residual is a mixture: (1 - share) of a normal density and a share of a uniform one that is
 `OUTLIER_WIDTH` standard deviations wide, so no reading however far off can rule a place out (Thrun, Burgard & Fox
@@ -48,6 +48,6 @@ def moments(weights: Floats, x: Floats, y: Floats, heading: Floats) -> tuple[Pos
 
 
 def carried(x: Floats, y: Floats, heading: Floats, motion: Increment) -> tuple[Floats, Floats]:
-    """Where points at (x, y) with ``heading`` come to by ``motion``, each in its own direction."""
+    """Points at (x, y) with ``heading`` after ``motion``, each in its own direction."""
     c, s = np.cos(heading), np.sin(heading)
     return x + c * motion.x - s * motion.y, y + s * motion.x + c * motion.y

@@ -1,6 +1,6 @@
 """The world a run happens in: anchors and their radio, the robot, the floor. A TOML file on disk.
 
-The whole world is stored inside every log, with its hash, so that a log says by itself what it was recorded with.
+The whole world is stored inside every log, with its hash, so that a log shows by itself what it was recorded with.
 Unknown keys are refused with the nearest match; anchors that make positioning impossible are refused at load.
 `docs/world.md` shows the file key by key.
 """
@@ -45,7 +45,7 @@ POSITIVE_RADIO = "frequency_hz", "path_loss_exponent", "reference_distance_m", "
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Where calibrated numbers of a world come from, for people and reports; no estimator reads it.
+    """Provenance of calibrated numbers of a world, for people and reports; no estimator reads it.
 
     ``recorded``: date of the newest log, by its own stamps. ``residual_std`` of the ``samples``, in their own unit.
     """
@@ -127,7 +127,7 @@ class World:
         walls = read_value(tuple[Wall, ...], table.get("walls", ()), "walls")
         provenance = read_value(str, table.get("provenance", ""), "provenance")
         calibration = read_value(Mapping[str, Calibration], table.get("calibration", {}), "calibration")
-        # Only now: every value is known to be one that JSON can tell (TOML also has dates).
+        # Only now: every value is known to be one that JSON can hold (TOML also has dates).
         text = json.dumps(table, sort_keys=True, separators=(",", ":"))
         return cls(
             name=name,
@@ -202,7 +202,9 @@ def _check_anchors(anchors: tuple[Anchor, ...]) -> None:
         by_id[anchor.id] = by_place[place] = anchor
     if len(anchors) >= 3 and are_collinear(np.array([[anchor.x, anchor.y] for anchor in anchors])):
         ids = ", ".join(anchor.id for anchor in anchors)
-        raise WorldError(f"anchors: {ids} lie on one line, so left and right of it look alike; move one off the line")
+        raise WorldError(
+            f"anchors: {ids} lie on one line, so left and right of it look the same; move one off the line"
+        )
 
 
 def _read_bounds(table: Mapping[str, Any], anchors: tuple[Anchor, ...]) -> Bounds:

@@ -42,7 +42,7 @@ class Unpacker:
     """Takes one message apart, in the order of its fields; raises `struct.error` or `ValueError` when it is cut off."""
 
     def __init__(self, message: bytes) -> None:
-        if message[:2] != HEADER[:2]:  # the two bytes after it are options, and say at most how much padding follows
+        if message[:2] != HEADER[:2]:  # the two bytes after it are options, and state at most how much padding follows
             raise ValueError(f"not little-endian CDR: starts with {message[:4].hex()}")
         self._body = memoryview(message)[4:]
         self._at = 0

@@ -16,7 +16,7 @@ CLOCKS = ("/clock_sync", "fusion_msgs/msg/ClockSync")
 
 
 class ClockSync(NamedTuple):
-    """The clocks of one computer at one moment [ns]. The stamps of its log count from boot: this says when that was."""
+    """The clocks of one computer at one moment [ns]. The stamps of its log count from boot: this dates it."""
 
     boot_ns: int
     monotonic_ns: int

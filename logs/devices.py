@@ -1,4 +1,4 @@
-"""What a recording tells of its own computer and devices: the wall clock, the devices, what they complained of."""
+"""The computer and the devices of a recording: its wall clock, descriptions of devices, their complaints."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from fusion.values import nanoseconds, seconds
 from logs.device_messages import ClockSync
 
 STEP_NS = nanoseconds(0.05)
-"""Least step of the wall clock against the time since boot that is told; NTP slews by less than this in ten seconds."""
-MOST_TOLD = 10
+"""Least step of the wall clock against the time since boot that is reported; NTP slews by less in ten seconds."""
+MOST_COMPLAINTS = 10
 STATE, RUNNING = "state", "running"
 """The key of a sensor's state in the diagnostics of its recorder, and its value while all is well."""
 OPENED = "opened"
-"""The text of the diagnostic by which a recorder tells what a device says of itself."""
+"""The text of the diagnostic by which a recorder keeps the description of an open device."""
 STATUS = "status"
-"""The text of the diagnostic by which a recorder tells, each second, how a sensor does."""
+"""The text of the diagnostic by which a recorder reports, each second, the state of a sensor."""
 
 
 def wall_clock(clocks: Sequence[ClockSync], start_ns: int) -> dict[str, Any] | None:
-    """The time of day that the log begins at, and the steps of the wall clock in it; None where nothing tells."""
+    """The time of day that the log begins at, and the steps of the wall clock in it; None where not known."""
     if not clocks:
         return None
     ordered = sorted(clocks)
@@ -46,18 +46,18 @@ def wall_clock(clocks: Sequence[ClockSync], start_ns: int) -> dict[str, Any] | N
 
 
 def devices(diagnostics: Sequence[Diagnostic]) -> dict[str, dict[str, str]]:
-    """What each device says of itself, by the name of its sensor: its last opening counts."""
+    """The description of each device, by the name of its sensor: its last opening counts."""
     return {diagnostic.sensor: dict(diagnostic.values) for diagnostic in diagnostics if diagnostic.text == OPENED}
 
 
 def complaints(diagnostics: Sequence[Diagnostic]) -> list[tuple[str, int]]:
-    """What went wrong with sensors, most frequent first, with its count; the states told each second are left out."""
+    """Warnings and errors of sensors, most frequent first, with their count; the states of each second are left out."""
     bad = (r for r in diagnostics if r.level is not Level.OK and r.text != STATUS)
-    return Counter(map(as_line, bad)).most_common(MOST_TOLD)
+    return Counter(map(as_line, bad)).most_common(MOST_COMPLAINTS)
 
 
 def as_line(diagnostic: Diagnostic) -> str:
-    """A diagnostic with the name of its sensor, which errors of drivers say by themselves."""
+    """A diagnostic with the name of its sensor, which errors of drivers have already."""
     return (
         diagnostic.text if diagnostic.text.startswith(diagnostic.sensor) else f"{diagnostic.sensor}: {diagnostic.text}"
     )

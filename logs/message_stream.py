@@ -1,7 +1,7 @@
 """One walk over the messages of an MCAP file, whole or damaged: ours, or anybody's.
 
 A file that a crash cut off opens all the same, and so does one with a damaged chunk in the middle: what is sound is
-there, and a warning says what is missing. The package's own message iterators answer such a file with nothing at all.
+there, and a warning states what is missing. The package's own message iterators answer such a file with nothing at all.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from logs.salvage.records import MAGIC
 from logs.salvage.scan import Salvage
 
 REPAIR_RECORD = "fusion repair"
-"""Name of the metadata record in which a repaired file says what it has lost."""
+"""Name of the metadata record in which a repaired file states what it has lost."""
 
 
 class Source(NamedTuple):
-    """Where a message comes from: its topic, its type, how it is packed, and the type's definition as the file has it
+    """Origin of a message: its topic, its type, its encoding, and the type's definition as the file has it
     (text of `ros2msg`, a protobuf FileDescriptorSet, a JSON schema).
     """
 
@@ -62,14 +62,14 @@ class Walk:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the walk could not read and what a repair could not, a sentence each; empty for a file that is whole."""
-        told = []
+        """Losses of the walk and of a repair before it, a sentence each; empty for a file that is whole."""
+        warnings = []
         if lost := self.metadata.get(REPAIR_RECORD, {}).get("lost"):
-            told.append(f"{self.path}: was repaired; it had been {lost}")
+            warnings.append(f"{self.path}: was repaired; it had been {lost}")
         if self.damage and str(self.damage):
             remedy = f"`fusion repair {self.path} -o GOOD.mcap` makes a whole file of the rest"
-            told.append(f"{self.path}: {self.damage}; {remedy}")
-        return tuple(told)
+            warnings.append(f"{self.path}: {self.damage}; {remedy}")
+        return tuple(warnings)
 
 
 def _source(channel: Channel, schema: Schema | None) -> Source:

@@ -36,7 +36,7 @@ from logs.cdr import Packer, Unpacker
 
 MAP = "map"
 NOT_GIVEN = -1.0
-"""First element of a covariance that says there is none (the convention of sensor_msgs/Imu)."""
+"""First element of a covariance that is not given (the convention of sensor_msgs/Imu)."""
 
 
 END_OF_TIME_NS = 2**31 * NANOSECONDS
@@ -75,7 +75,7 @@ def take_pose(cursor: Unpacker) -> tuple[Pose, bool]:
 
 
 def planar(x: float, y: float, qx: float, qy: float, qz: float, qw: float) -> tuple[Pose, bool]:
-    """What a pose in space is on the floor, and whether its heading is known: the yaw of a unit quaternion. Not of one
+    """A pose in space brought to the floor, and whether its heading is known: the yaw of a unit quaternion. Not of one
     that is no rotation, all zero or not finite: the heading is zero then, and not known.
     """
     if not any((qx, qy, qz, qw)) or not all(map(math.isfinite, (qx, qy, qz, qw))):
@@ -151,7 +151,7 @@ def _decode_gyro(data: bytes, seq: int) -> Gyro:
     time_ns, sensor = take_header(cursor)
     *_, rate_rad_s, first_covariance = cursor.take("d", 17)
     if first_covariance == NOT_GIVEN:
-        raise ValueError("the message says that it measures no turn rate")
+        raise ValueError("the message states that it measures no turn rate")
     cursor.take("d", 8)
     x, y, z, first_covariance = cursor.take("d", 4)
     return Gyro(time_ns, sensor, seq, rate_rad_s, None if first_covariance == NOT_GIVEN else (x, y, z))
@@ -240,7 +240,7 @@ def encode_prior(prior: Prior) -> tuple[bytes, dict[str, str]]:
 
 
 def decode_prior(data: bytes, about: Mapping[str, str]) -> Prior:
-    """The starting pose from its message and the log's metadata, which wins where it tells more."""
+    """The starting pose from its message and the log's metadata, which wins where it holds more."""
     cursor = Unpacker(data)
     time_ns, _ = take_header(cursor)
     pose, has_heading = take_pose(cursor)
@@ -253,7 +253,7 @@ def decode_prior(data: bytes, about: Mapping[str, str]) -> Prior:
 
 
 def encode_estimate(estimate: Estimate) -> bytes:
-    """An estimate; one without a covariance says so in its first element."""
+    """An estimate; one without a covariance states so in its first element."""
     message = _put_pose(stamped(estimate.time_ns, MAP), estimate.pose, heading_known=estimate.heading_known)
     return _put_covariance(message, estimate.covariance).message()
 
@@ -267,7 +267,7 @@ def decode_estimate(data: bytes) -> Estimate:
 
 
 def encode_fates(time_ns: int, sensor: str, fates: tuple[Fate, ...]) -> bytes:
-    """What became of the readings of one measurement."""
+    """The fates of the readings of one measurement."""
     message = stamped(time_ns, sensor).put("I", len(fates))
     for fate in fates:
         message.text(fate.anchor).text(fate.decision.value).text(fate.reason.value)

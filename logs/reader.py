@@ -24,7 +24,7 @@ from logs.writer import RUN_RECORD
 
 @dataclass
 class _Contents:
-    """What the walk over a file has found so far."""
+    """Content of a file as far as it was walked."""
 
     record: dict[str, str]
     measurements: list[tuple[int, Measurement]] = field(default_factory=list)
@@ -39,7 +39,7 @@ class _Contents:
 
 
 class Log(NamedTuple):
-    """A run, and what only the file it came from tells: the measurements in the order they stand there, each after
+    """A run, and what only its file holds: the measurements in the order they stand there, each after
     its log time [ns], and what is damaged.
     """
 
@@ -97,7 +97,7 @@ def read_world(path: Path) -> World:
 
 
 def holds_run(path: Path) -> bool:
-    """Whether the file is a log of ours: it says so before its first message. Raises `LogError` for no MCAP file."""
+    """Whether the file is a log of ours: it states so before its first message. Raises `LogError` for no MCAP file."""
     walk = Walk(path)
     next(iter(walk), None)
     return "world" in walk.metadata.get(RUN_RECORD, {})
@@ -141,22 +141,25 @@ def _take_prior(contents: _Contents, data: bytes) -> None:
 
 
 def _warnings(path: Path, contents: _Contents, world: World) -> tuple[str, ...]:
-    found = []
+    warnings = []
     if contents.record.get("world_hash", world.hash) != world.hash:
-        found.append(f"{path}: the world stored in it is not the one it was written with; its hash differs")
+        warnings.append(f"{path}: the world stored in it is not the one it was written with; its hash differs")
     uncounted = left_out([truth.position_known for truth in contents.truths])
-    found += [f"{path}: {sentence}" for sentence in (*contents.refused, *uncounted)]
-    found += [f"{path}: {count} messages of {topic} cannot be decoded" for topic, count in contents.unreadable.items()]
-    found += [f"{path}: {count} messages of {topic} are of no use here" for topic, count in contents.foreign.items()]
+    warnings += [f"{path}: {sentence}" for sentence in (*contents.refused, *uncounted)]
+    warnings += [
+        f"{path}: {count} messages of {topic} cannot be decoded" for topic, count in contents.unreadable.items()
+    ]
+    warnings += [f"{path}: {count} messages of {topic} are of no use here" for topic, count in contents.foreign.items()]
     if not contents.measurements:
-        found.append(f"{path}: holds no measurements")
-    return tuple(found)
+        warnings.append(f"{path}: holds no measurements")
+    return tuple(warnings)
 
 
 def _cautions(path: Path, contents: _Contents, world: World) -> Iterator[str]:
-    """What makes the run misleading though all of it can be read."""
+    """Warnings of a run that is misleading though all of it can be read."""
     measurements = [measurement for _, measurement in contents.measurements]
-    if found := caution_of_run(world.robot, measurements, contents.diagnostics):
+    if caution := caution_of_run(world.robot, measurements, contents.diagnostics):
         # A later part of a recording begins with a command that stands in an earlier one.
-        is_part = contents.record.get("split", "0") != "0"
-        yield f"{path}: {found._replace(cure='join the parts of the recording (`fusion join`)') if is_part else found}"
+        if contents.record.get("split", "0") != "0":
+            caution = caution._replace(cure="join the parts of the recording (`fusion join`)")
+        yield f"{path}: {caution}"

@@ -1,6 +1,6 @@
-"""When the messages of one sensor came, and what is odd about it: gaps, disorder, duplicates, lateness, clock jumps.
+"""Times of the messages of one sensor, and their faults: gaps, disorder, duplicates, lateness, clock jumps.
 
-Two clocks are compared: the stamp says when a measurement was true, the log time when it arrived. A message that is
+Two clocks are compared: the stamp is when a measurement was true, the log time when it arrived. A message that is
 late comes back to the usual delay with the next one; after a jump of a clock the delay stays another.
 """
 
@@ -29,7 +29,7 @@ class Stream(NamedTuple):
     numbers: Whole
 
     def timing(self, start_ns: int) -> dict[str, Any]:
-        """What is known of it, as plain values: [s] and [Hz], places in seconds after ``start_ns``."""
+        """The same as plain values: [s] and [Hz], places in seconds after ``start_ns``."""
         ordered = np.sort(self.stamps)
         gaps = np.diff(ordered)
         arrived = self.stamps[np.argsort(self.arrivals, kind="stable")]
@@ -59,7 +59,7 @@ class Stream(NamedTuple):
         return self.arrivals - self.stamps
 
     def jumps(self) -> list[tuple[int, int]]:
-        """Where the delay changes for good: the first message after it, and by how much [ns]."""
+        """Changes of the delay that last: the first message after it, and by how much [ns]."""
         if len(self.stamps) < 2 * JUMP_MESSAGES:
             return []
         windows = np.lib.stride_tricks.sliding_window_view(self._late, JUMP_MESSAGES)

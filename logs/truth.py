@@ -94,7 +94,7 @@ def interpolate_truth(known: Instants, time_ns: Whole, *, gap_s: float) -> tuple
     share = (time_ns - known.time_ns[left]) / span_ns
     turn = wrap_angles(known.heading[left + 1] - known.heading[left])
     between = wrap_angles(known.heading[left] + share * turn)
-    # At a stamp of the truth itself the other neighbour, perhaps without a heading, has no say.
+    # At a stamp of the truth itself the other neighbour, perhaps without a heading, does not count.
     heading = np.select([share == 0.0, share == 1.0], [known.heading[left], known.heading[left + 1]], between)
     resampled = Instants(
         time_ns,
@@ -110,7 +110,7 @@ DURATIONS_S = (1, 5, 10)
 LONGEST = 1.5
 """A pair whose ends lie further apart than this many times what was asked, as across a gap, is none."""
 ROUNDING_M = 1e-9
-"""A path is that much longer than its sum of floating-point steps says: whole steps then end where they should."""
+"""A path may be that much longer than its sum of floating-point steps: whole steps then end where they should."""
 
 Pairs = tuple[slice | Whole, slice | Whole]
 """Indices of the instants where each pair starts and ends."""

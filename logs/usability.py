@@ -1,4 +1,4 @@
-"""What each available estimator could make of a run: judged by its tags, and by the Fates of a short replay.
+"""Usability of a run for each available estimator, by its tags and by the Fates of a short replay.
 
 Nothing is scored here. An estimator is usable where the log has the start it needs and at least one reading (for those
 that use motion alone: odometry) that enters its state.
@@ -44,7 +44,7 @@ class Usability(NamedTuple):
     readings: int = 0
     used: int = 0
     refused: tuple[tuple[str, int], ...] = ()
-    """Why readings did not enter, and how many."""
+    """Number of readings that did not enter, by reason."""
 
     def record(self) -> dict[str, Any]:
         """The same as plain values."""
@@ -91,7 +91,7 @@ def _missing_data(estimator: Estimator[Any], measurements: Sequence[Measurement]
 
 
 def _radio_fates(updates: Sequence[Update]) -> list[Fate]:
-    """What became of the readings, each told once: an update that was revised counts for the first one."""
+    """Fates of the readings, each once: an update that was revised counts for the first one."""
     own = (update for update in updates if not update.revised and isinstance(update.measurement, WifiScan | Ranges))
     return [fate for update in own for fate in update.fates]
 

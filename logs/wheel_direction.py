@@ -48,8 +48,8 @@ def caution_of_run(
         *((order(m), m) for m in measurements),
         *((_order(diagnostic), diagnostic) for diagnostic in diagnostics),
     ]
-    for _, said in sorted(stamped, key=lambda row: row[0]):
-        watch.take(said)
+    for _, output in sorted(stamped, key=lambda row: row[0]):
+        watch.take(output)
     return watch.caution and (caution(robot, {type(measurement) for measurement in measurements}) or watch.caution)
 
 
@@ -76,16 +76,16 @@ class DirectionWatch:
         self._start_ns: int | None = None
         self._missed_ns: int | None = None
 
-    def take(self, said: DriverOutput) -> None:
+    def take(self, output: DriverOutput) -> None:
         """Follow one thing that a sensor measured, or a diagnostic of it."""
-        if isinstance(said, MotorCommand) and all(map(math.isfinite, said.wheel_speeds_m_s)):
-            self._commanders.add(said.sensor)
-            pairs = zip(self._is_known, said.wheel_speeds_m_s, strict=False)
+        if isinstance(output, MotorCommand) and all(map(math.isfinite, output.wheel_speeds_m_s)):
+            self._commanders.add(output.sensor)
+            pairs = zip(self._is_known, output.wheel_speeds_m_s, strict=False)
             self._is_known = [known or speed != 0.0 for known, speed in pairs]
-        elif isinstance(said, WheelTicks):
-            self._roll(said)
-        elif isinstance(said, Diagnostic) and is_down(said):
-            self.lose(said.sensor)
+        elif isinstance(output, WheelTicks):
+            self._roll(output)
+        elif isinstance(output, Diagnostic) and is_down(output):
+            self.lose(output.sensor)
 
     def lose(self, sensor: str) -> None:
         """A sensor is lost; if it brought commands, nothing states any more which of them hold."""

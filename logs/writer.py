@@ -30,9 +30,9 @@ from logs.schemas import SCHEMAS
 RUN_RECORD = "fusion"
 """Name of the metadata record that makes an MCAP file one of ours."""
 LIBRARY = "fusion"
-"""What the header of a log says of its writer."""
+"""Name of the writer in the header of a log."""
 LOSS_NS = nanoseconds(1.0)
-"""What a crash may cost, by the stamps of a log."""
+"""Largest loss by a crash, by the stamps of a log."""
 FLUSH_NS = nanoseconds(0.9)
 """A little less than that, since what is received must still be written."""
 SYNC_S = 0.8
@@ -79,47 +79,47 @@ class RunWriter:
             self._add(*messages.PRIOR, prior.time_ns, prior.time_ns, 0, start)
 
     def write(self, measurement: Measurement, *, log_time_ns: int | None = None) -> None:
-        """Append a measurement; ``log_time_ns`` says when it arrived, if not when it was true."""
+        """Append a measurement; ``log_time_ns`` is when it arrived, if not when it was true."""
         codec = CODECS[type(measurement)]
         log_ns = measurement.time_ns if log_time_ns is None else log_time_ns
         self._add(codec.topic, codec.schema, log_ns, measurement.time_ns, measurement.seq, codec.encode(measurement))
 
     def write_truth(self, truth: Truth, *, log_time_ns: int | None = None) -> None:
-        """Append where the robot really was; ``log_time_ns`` says when that arrived, if not when it was true."""
+        """Append a true pose; ``log_time_ns`` is when it arrived, if not when it was true."""
         log_ns = truth.time_ns if log_time_ns is None else log_time_ns
         self._add(*messages.TRUTH, log_ns, truth.time_ns, 0, messages.encode_truth(truth))
 
     def write_diagnostic(self, diagnostic: Diagnostic, *, log_time_ns: int | None = None) -> None:
-        """Append a diagnostic of a device; ``log_time_ns`` says when that arrived."""
+        """Append a diagnostic of a device; ``log_time_ns`` is when it arrived."""
         log_ns = diagnostic.time_ns if log_time_ns is None else log_time_ns
         self._add(
             *device_messages.DIAGNOSTICS, log_ns, diagnostic.time_ns, 0, device_messages.encode_diagnostic(diagnostic)
         )
 
     def write_clock(self, sync: ClockSync) -> None:
-        """Append how the clocks of this computer stand to each other."""
+        """Append one reading of all clocks of this computer."""
         self._add(*device_messages.CLOCKS, sync.boot_ns, sync.boot_ns, 0, device_messages.encode_clock(sync))
 
     def write_update(self, lane: str, update: Update, *, log_time_ns: int | None = None) -> None:
-        """Append what an estimator said: its estimate (if valid) and the fates of the readings; ``log_time_ns`` says
+        """Append the update of an estimator: its estimate (if valid) and the fates of the readings; ``log_time_ns`` is
         when, if not at the time it is about. Raises `PluginError` for what no message can hold.
         """
         estimate, measurement = update.estimate, update.measurement
         stamp = estimate.time_ns
         log_ns = stamp if log_time_ns is None else log_time_ns
         try:
-            said = messages.encode_estimate(estimate) if estimate.valid else b""
+            message = messages.encode_estimate(estimate) if estimate.valid else b""
             fates = (
                 messages.encode_fates(measurement.time_ns, measurement.sensor, update.fates) if update.fates else b""
             )
         except Exception as error:
             raise PluginError(
-                f"{lane}: what it said to {measurement.sensor!r} at {measurement.time_ns} ns fits no message "
+                f"{lane}: its update by {measurement.sensor!r} at {measurement.time_ns} ns fits no message "
                 f"({error!r}); report it to its author"
             ) from error
-        if said:
+        if message:
             schema = "geometry_msgs/msg/PoseWithCovarianceStamped"
-            self._add(ESTIMATE_TOPIC + lane, schema, log_ns, stamp, 0, said)
+            self._add(ESTIMATE_TOPIC + lane, schema, log_ns, stamp, 0, message)
         if fates:
             self._add(FATES_TOPIC + lane, FATES, log_ns, measurement.time_ns, measurement.seq, fates)
 

@@ -18,7 +18,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Check, tell; 1 when a promise is broken."""
+    """Check, and print the verdicts; 1 when a promise is broken."""
     verdicts = run_driver_checks(arguments.name) if arguments.driver else run_checks(arguments.name)
     if arguments.json:
         rows = [verdict._asdict() | {"outcome": verdict.outcome.value} for verdict in verdicts]

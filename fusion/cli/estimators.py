@@ -56,6 +56,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def show(entries: Sequence[Mapping[str, Any]], text: Callable[[Any], str], *, as_json: bool) -> None:
-    """What is installed, on stdout: a line or more each by ``text``, or one JSON list."""
-    told = json.dumps(entries, indent=2, default=str) + "\n" if as_json else "".join(map(text, entries))
-    sys.stdout.write(told)
+    """Print what is installed: a line or more each by ``text``, or one JSON list."""
+    as_text = json.dumps(entries, indent=2, default=str) + "\n" if as_json else "".join(map(text, entries))
+    sys.stdout.write(as_text)

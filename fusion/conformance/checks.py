@@ -43,7 +43,7 @@ class Check(NamedTuple):
 
 @unique
 class Outcome(Enum):
-    """What a check came to."""
+    """Outcome of a check."""
 
     KEPT = "kept"
     BROKEN = "broken"
@@ -52,7 +52,7 @@ class Outcome(Enum):
 
 
 class Verdict(NamedTuple):
-    """What a check came to, and its counter-example or excuse."""
+    """Outcome of a check, and its counter-example or excuse."""
 
     id: str
     reason: str

@@ -1,8 +1,8 @@
-"""The conformance kit of drivers: what every driver promises, each promise a small hunt for a counter-example.
+"""The conformance kit of drivers: the promises of every driver, each a small hunt for a counter-example.
 
 Half of them need no device: a driver must behave where nothing is plugged in. The others play on the driver's own
-`FakeDevice`; a driver that ships none is told so. Ours and strangers' drivers alike are held against the same list,
-by `fusion check --driver NAME` or, in a test, by `run_driver_checks`.
+`FakeDevice`; for a driver that ships none they are skipped. Ours and strangers' drivers are held against the same
+list, by `fusion check --driver NAME` or, in a test, by `run_driver_checks`.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from fusion.values import Truth, seconds
 
 NAME = "sensor-under-test"
 TRIES = 50
-"""Polls after which a device that spoke must have been heard."""
+"""Polls after which the message of a device must have come out."""
 POLL_S = 0.05
 LATE_S = 2.0
-"""How much longer than asked a poll may take: a whole Wi-Fi scan is never waited for in one."""
+"""Time that a poll may take longer than asked [s]: a whole Wi-Fi scan is never waited for in one."""
 
 
 class DriverPromise(NamedTuple):
-    """What must hold. ``test`` raises `ConformanceError`; ``plays``: it needs the driver's fake device."""
+    """A promise. ``test`` raises `ConformanceError`; ``plays``: it needs the driver's fake device."""
 
     id: str
     reason: str
@@ -54,7 +54,7 @@ def run_driver_checks(name: str) -> list[Verdict]:
 
 
 def driver_verdict(promise: DriverPromise, made: type[Any]) -> Verdict:
-    """What one promise comes to for one driver class; raises `DependencyError` for a package that is missing."""
+    """The verdict on one promise for one driver class; raises `DependencyError` for a package that is missing."""
     if promise.plays and not hasattr(made, "fake"):
         return Verdict(promise.id, promise.reason, Outcome.SKIPPED, "the driver ships no fake device: fake()")
     try:
@@ -79,21 +79,21 @@ def _playing(made: type[Any]) -> Iterator[tuple[Driver, FakeDevice]]:
 
 
 def _listen(driver: Driver, until: Callable[[DriverOutput], bool]) -> list[DriverOutput]:
-    """What the driver says until something is as wanted; gives up after many polls."""
-    heard: list[DriverOutput] = []
+    """Output of the driver until some is as wanted; gives up after many polls."""
+    outputs: list[DriverOutput] = []
     for _ in range(TRIES):
-        heard += driver.poll(POLL_S)
-        if any(until(said) for said in heard):
+        outputs += driver.poll(POLL_S)
+        if any(until(output) for output in outputs):
             break
-    return heard
+    return outputs
 
 
-def _is_measurement(said: DriverOutput) -> bool:
-    return not isinstance(said, Diagnostic)
+def _is_measurement(output: DriverOutput) -> bool:
+    return not isinstance(output, Diagnostic)
 
 
-def _measured(said: Sequence[DriverOutput]) -> list[Any]:
-    return [one for one in said if _is_measurement(one)]
+def _measured(output: Sequence[DriverOutput]) -> list[Any]:
+    return [one for one in output if _is_measurement(one)]
 
 
 @_promise("describes_itself", "a list of drivers must not need their hardware", plays=False)
@@ -105,9 +105,9 @@ def _describes_itself(made: type[Any]) -> None:
 
 @_promise("discovers_quietly", "looking for devices on any machine must end well", plays=False)
 def _discovers_quietly(made: type[Any]) -> None:
-    found = made.discover()
-    require(isinstance(found, list), f"discover answered {found!r}, not a list")
-    strangers = [one for one in found if not isinstance(one, Found)]
+    devices = made.discover()
+    require(isinstance(devices, list), f"discover answered {devices!r}, not a list")
+    strangers = [one for one in devices if not isinstance(one, Found)]
     require(not strangers, f"discover found {strangers}, which are no Found")
 
 
@@ -129,25 +129,25 @@ def _has_a_spec(made: type[Any]) -> None:
         require(spec.nominal_hz >= spec.least_hz >= 0.0, f"nominal {spec.nominal_hz} Hz, least {spec.least_hz} Hz")
 
 
-@_promise("opens_and_says_what", "a log must tell which device and which settings it came from")
-def _opens_and_says_what(made: type[Any]) -> None:
+@_promise("opens_and_reports_its_device", "a log must state which device and which settings it came from")
+def _opens_and_reports_its_device(made: type[Any]) -> None:
     with _playing(made) as (driver, _):
         info = driver.open()
         require(isinstance(info, DeviceInfo), f"open answered {info!r}, not a DeviceInfo")
-        require(info.model, "open tells no model")
+        require(info.model, "open reports no model")
 
 
-@_promise("measures", "what the device says must come out, under the sensor's name and of the kinds of its spec")
+@_promise("measures", "what the device sends must come out, under the sensor's name and of the kinds of its spec")
 def _measures(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
         device.speak()
-        heard = _listen(driver, _is_measurement)
-        require(_measured(heard), f"the device spoke and no measurement came in {TRIES} polls: {heard}")
-        for said in heard:
-            name = NAME if isinstance(said, Truth) else said.sensor
-            require(name == NAME, f"{said} goes by the name {name!r}, not {NAME!r}")
-            require(isinstance(said, (*driver.spec.kinds, Diagnostic)), f"{said} is of no kind that its spec names")
+        outputs = _listen(driver, _is_measurement)
+        require(_measured(outputs), f"the device spoke and no measurement came in {TRIES} polls: {outputs}")
+        for output in outputs:
+            name = NAME if isinstance(output, Truth) else output.sensor
+            require(name == NAME, f"{output} goes by the name {name!r}, not {NAME!r}")
+            require(isinstance(output, (*driver.spec.kinds, Diagnostic)), f"{output} is of no kind that its spec names")
 
 
 @_promise("stamps_honestly", "a stamp is when it was true: never in the future, never before the device was opened")
@@ -156,23 +156,23 @@ def _stamps_honestly(made: type[Any]) -> None:
         opened_ns = device.clock.now_ns()
         driver.open()
         device.speak()
-        for said in _measured(_listen(driver, _is_measurement)):
+        for output in _measured(_listen(driver, _is_measurement)):
             now_ns = device.clock.now_ns()
-            early_s = seconds(opened_ns - said.time_ns)
-            require(said.time_ns <= now_ns, f"{said} is stamped {seconds(said.time_ns - now_ns)} s in the future")
-            require(early_s <= 0.0, f"{said} is stamped {early_s} s before the device was opened")
+            early_s = seconds(opened_ns - output.time_ns)
+            require(output.time_ns <= now_ns, f"{output} is stamped {seconds(output.time_ns - now_ns)} s in the future")
+            require(early_s <= 0.0, f"{output} is stamped {early_s} s before the device was opened")
 
 
 @_promise("numbers_rise", "a gap in the numbers is how a lost message shows")
 def _numbers_rise(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
-        heard = []
+        outputs = []
         for _ in range(3):
             device.speak()
-            heard += _measured(_listen(driver, _is_measurement))
-        for kind in {type(said) for said in heard}:
-            numbers = [getattr(said, "seq", said.time_ns) for said in heard if type(said) is kind]
+            outputs += _measured(_listen(driver, _is_measurement))
+        for kind in {type(output) for output in outputs}:
+            numbers = [getattr(output, "seq", output.time_ns) for output in outputs if type(output) is kind]
             require(numbers == sorted(set(numbers)), f"{kind.__name__} came with the numbers {numbers}")
 
 
@@ -187,21 +187,22 @@ def _waits_no_longer(made: type[Any]) -> None:
         require(took_s <= POLL_S + LATE_S, f"a poll of {POLL_S} s took {took_s:.2f} s")
 
 
-@_promise("survives_garbage", "one bad line costs that line, and is told")
+@_promise("survives_garbage", "one bad line costs that line, and is reported")
 def _survives_garbage(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
         device.garble()
-        told = _listen(driver, lambda said: isinstance(said, Diagnostic) and said.level is not Level.OK)
+        outputs = _listen(driver, lambda output: isinstance(output, Diagnostic) and output.level is not Level.OK)
         require(
-            any(isinstance(said, Diagnostic) for said in told), "the device said nonsense and no diagnostic tells of it"
+            any(isinstance(output, Diagnostic) for output in outputs),
+            "the device sent nonsense and no diagnostic reports it",
         )
         device.speak()
         require(_measured(_listen(driver, _is_measurement)), "after nonsense no measurement came any more")
 
 
-@_promise("tells_of_loss", "a device that is gone must not look like one that is silent")
-def _tells_of_loss(made: type[Any]) -> None:
+@_promise("reports_loss", "a device that is gone must not look like one that is silent")
+def _reports_loss(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
         device.speak()
@@ -224,7 +225,9 @@ def _refuses_absence(made: type[Any]) -> None:
             driver.open()
         except DriverError as error:
             require(error.hint, "the error gives no hint")
-            require(error.passes, f"{type(error).__name__} says that it cannot pass, but the device may be plugged in")
+            require(
+                error.passes, f"{type(error).__name__} states that it cannot pass, but the device may be plugged in"
+            )
             return
         raise ConformanceError("it opened a device that is not there")
 

@@ -13,7 +13,7 @@ Test: TypeAlias = Callable[[type[Any]], None]
 
 
 class Promise(NamedTuple):
-    """What must hold: ``test`` raises `ConformanceError` with a counter-example.
+    """A promise: ``test`` raises `ConformanceError` with a counter-example.
 
     ``id`` stays the same, so that a promise can be excused by name; ``reason`` is a sentence that states why it
     matters. ``unless`` excuses estimators with any of these tags, ``needs`` those without any of these, ``offers``

@@ -76,8 +76,8 @@ class SyntheticRun:
         """Everything measured, in time order: odometry, ranges at 2 Hz, a Wi-Fi scan and a gyro sample a second."""
         seconds_on = range(1, int(self.duration_s) + 1)
         gyro = [Gyro(second * NANOSECONDS, "gyro", second, self.turn_rate_rad_s) for second in seconds_on]
-        found: list[Measurement] = [*self._odometry(), *self._radio(), *gyro]
-        return tuple(sorted(found, key=order))
+        measurements: list[Measurement] = [*self._odometry(), *self._radio(), *gyro]
+        return tuple(sorted(measurements, key=order))
 
     def _odometry(self) -> list[Odometry]:
         period_ns = NANOSECONDS // self.odometry_hz
@@ -89,7 +89,7 @@ class SyntheticRun:
 
     def _radio(self) -> list[Measurement]:
         world, random = self.world(), np.random.Generator(np.random.PCG64(7))
-        found: list[Measurement] = []
+        scans: list[Measurement] = []
         for half in range(1, int(2.0 * min(self.duration_s, self.radio_until_s)) + 1):
             time_ns = nanoseconds(0.5 * half)
             x, y, _ = self.pose(time_ns)
@@ -101,14 +101,14 @@ class SyntheticRun:
                 RangeReading(anchor.id, float(anchor.ranging.expected(distance)) + NOISE_STD[0] * float(error))
                 for anchor, distance, error in zip(anchors, distances, errors[0], strict=True)
             )
-            found.append(Ranges(time_ns, "uwb", half, ranges))
+            scans.append(Ranges(time_ns, "uwb", half, ranges))
             if half % 2 == 0:
                 strengths = tuple(
                     RssiReading(anchor.id, float(anchor.radio.expected(distance)) + NOISE_STD[1] * float(error))
                     for anchor, distance, error in zip(anchors, distances, errors[1], strict=True)
                 )
-                found.append(WifiScan(time_ns, "wifi", half, strengths))
-        return found
+                scans.append(WifiScan(time_ns, "wifi", half, strengths))
+        return scans
 
 
 def without(measurements: tuple[Measurement, ...], sensor: str) -> tuple[Measurement, ...]:

@@ -1,7 +1,7 @@
 """Colours of the review: fixed by name, so that one means the same in every picture.
 
-Okabe & Ito (2008), told apart by colour-blind people too, on a dark ground; no pure white or black, for the viewer's
-web edition may follow a light theme.
+Okabe & Ito (2008), distinguishable for colour-blind people too, on a dark ground; no pure white or black, for the
+viewer's web edition may follow a light theme.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PURPLE, BLUE, GREEN, GREY = (204, 121, 167), (0, 114, 178), (0, 158, 115), (150,
 PALETTE: tuple[Colour, ...] = (SKY, VERMILLION, GREEN, PURPLE, ORANGE, BLUE, ANCHOR)
 
 TAKEN, REFUSED, UNSURE, LOST = GREEN, VERMILLION, GREY, PURPLE
-"""Of readings and of states: green and vermillion, which more eyes can tell apart than green and red."""
+"""Of readings and of states: green and vermillion, which more eyes can distinguish than green and red."""
 
 ESTIMATORS: Mapping[str, Colour] = {
     "dead_reckoning": GREY,

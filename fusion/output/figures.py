@@ -1,4 +1,4 @@
-"""What all our pictures by matplotlib have in common: panels in a row, plain axes, the colours of the review."""
+"""Common parts of our pictures by matplotlib: panels in a row, plain axes, the colours of the review."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Results that leave the program: written whole, or told in one sentence why not."""
+"""Results that leave the program: written whole, or refused in one sentence."""
 
 from __future__ import annotations
 

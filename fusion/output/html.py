@@ -36,7 +36,7 @@ a { color: light-dark(#0072b2, #56b4e9); }
 
 
 DATA, END = '<script type="application/json" id="data">', "</script>"
-"""What stands around the numbers of a page; inside, `<` is escaped."""
+"""Frame of a page around its numbers; inside, `<` is escaped."""
 
 
 def as_html(title: str, markdown: str, script: str = "", data: object = None) -> bytes:

@@ -1,4 +1,4 @@
-"""How far long work is, for a person who waits for it."""
+"""Progress of long work, for a person who waits for it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Told how far the work is: parts done, of how many, and which was last."""
+    """A receiver of progress: parts done, of how many, and which was last."""
 
     def __call__(self, done: int, total: int, what: str) -> None:
         """One more part is done."""
@@ -24,7 +24,7 @@ def progress_bar(title: str) -> Iterator[Progress]:
     with Bar(console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True) as bar:
         task = bar.add_task(title, total=None)
 
-        def tell(done: int, total: int, what: str) -> None:
+        def report(done: int, total: int, what: str) -> None:
             bar.update(task, completed=done, total=total, description=what)
 
-        yield tell
+        yield report

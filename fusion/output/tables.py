@@ -23,7 +23,7 @@ class Sheet(NamedTuple):
 
 
 def console(file: IO[str] | None = None) -> Console:
-    """Where tables are printed: as wide as the terminal, or `WIDTH`."""
+    """The console for tables: as wide as the terminal, or `WIDTH`."""
     from rich.console import Console
 
     made = Console(file=file or sys.stdout)

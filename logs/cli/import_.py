@@ -39,18 +39,20 @@ def import_recordings(
         raise ParameterError(f"{kind} needs {', '.join(lacking)}; `fusion import --help` shows the options there are")
     if not source.exists():
         raise RecordingError(f"{source}: no such folder; give the folder that holds the recording")
-    found = _recordings(kind, read(source, **options))
-    for warning in (warning for recording in found for warning in recording.doubts):
+    recordings = _recordings(kind, read(source, **options))
+    for warning in (warning for recording in recordings for warning in recording.doubts):
         sys.stderr.write(f"warning: {warning}\n")
-    paths = _free_paths(output, found, force=force)
-    return [recording.write(path) for recording, path in zip(found, paths, strict=True)]
+    paths = _free_paths(output, recordings, force=force)
+    return [recording.write(path) for recording, path in zip(recordings, paths, strict=True)]
 
 
-def _free_paths(output: Path, found: Sequence[Recording], *, force: bool) -> list[Path]:
-    if output.suffix == ".mcap" and len(found) != 1:
-        run_names = ", ".join(recording.name for recording in found)
-        raise RecordingError(f"the folder holds {len(found)} runs ({run_names}); give a folder with -o, not one file")
-    paths = [output if output.suffix == ".mcap" else output / f"{recording.name}.mcap" for recording in found]
+def _free_paths(output: Path, recordings: Sequence[Recording], *, force: bool) -> list[Path]:
+    if output.suffix == ".mcap" and len(recordings) != 1:
+        run_names = ", ".join(recording.name for recording in recordings)
+        raise RecordingError(
+            f"the folder holds {len(recordings)} runs ({run_names}); give a folder with -o, not one file"
+        )
+    paths = [output if output.suffix == ".mcap" else output / f"{recording.name}.mcap" for recording in recordings]
     for path in paths:
         if path.exists() and not (force and path.is_file()):
             raise LogError(f"{path}: exists already; choose another name, or write over a file with --force")
@@ -58,12 +60,12 @@ def _free_paths(output: Path, found: Sequence[Recording], *, force: bool) -> lis
 
 
 def _recordings(kind: str, answer: object) -> list[Recording]:
-    found = []
+    recordings = []
     for one in answer if isinstance(answer, Iterable) else [answer]:
         if not isinstance(one, Recording):
             raise PluginError(f"the importer {kind} answered {one!r}; it must answer `Recording`s (docs/plugin.md)")
-        found.append(one)
-    return found
+        recordings.append(one)
+    return recordings
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

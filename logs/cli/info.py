@@ -28,9 +28,9 @@ from logs.usability import usability
 
 
 def describe(path: Path) -> dict[str, Any]:
-    """Everything `fusion info` tells, as plain values: times in seconds, rates in hertz.
+    """Everything that `fusion info` shows, as plain values: times in seconds, rates in hertz.
 
-    A bag of somebody else's is told topic by topic, under the key ``topics``.
+    A bag of another robot is described topic by topic, under the key ``topics``.
     """
     if path.is_dir() or not holds_run(path):
         return _describe_bag(path)
@@ -64,9 +64,9 @@ def describe(path: Path) -> dict[str, Any]:
 
 def _describe_bag(path: Path) -> dict[str, Any]:
     bag = open_bag(path, keep=lambda _kind, _sample: False)
-    heard = [topic for topic in bag.topics.values() if topic.count]
-    first_ns = min((topic.first_ns for topic in heard), default=0)
-    last_ns = max((topic.last_ns for topic in heard), default=0)
+    filled = [topic for topic in bag.topics.values() if topic.count]
+    first_ns = min((topic.first_ns for topic in filled), default=0)
+    last_ns = max((topic.last_ns for topic in filled), default=0)
     return {
         "path": str(path),
         "name": path.resolve().name.removesuffix(".mcap"),
@@ -90,14 +90,14 @@ def _describe_bag(path: Path) -> dict[str, Any]:
 
 
 def _anchors(run: Run) -> dict[str, Any]:
-    """The anchors of the world, and the readings of each anchor that was heard, known or not."""
+    """The anchors of the world, and the number of readings of each anchor, known or not."""
     scans = (measurement for measurement in run.measurements if isinstance(measurement, WifiScan | Ranges))
-    heard = Counter(reading.anchor for scan in scans for reading in scan.readings)
+    counts = Counter(reading.anchor for scan in scans for reading in scan.readings)
     known = [anchor.id for anchor in run.world.anchors]
     return {
         "anchors": known,
-        "readings": {anchor: heard[anchor] for anchor in known},
-        "unknown_anchors": {anchor: heard[anchor] for anchor in sorted(heard.keys() - set(known))},
+        "readings": {anchor: counts[anchor] for anchor in known},
+        "unknown_anchors": {anchor: counts[anchor] for anchor in sorted(counts.keys() - set(known))},
     }
 
 
@@ -126,20 +126,20 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Tell what is in each log; one that cannot be read does not keep the others from being told."""
-    told = []
+    """Describe each log; one that cannot be read does not keep the others from being described."""
+    described = []
     paths = [path for given in arguments.runs for path in _logs(given)]
     for path in paths:
         try:
-            told.append(describe(path))
+            described.append(describe(path))
         except FusionError as error:
             sys.stderr.write(f"fusion info: {error}\n")
     several = paths != arguments.runs or len(paths) > 1
     if not arguments.json:
-        sys.stdout.write("\n".join([*map(info_text, told), *_parts(arguments.runs, told)]))
-    elif told or several:
-        sys.stdout.write(json.dumps(told if several else told[0], indent=2) + "\n")
-    return int(len(told) < len(paths))
+        sys.stdout.write("\n".join([*map(info_text, described), *_parts(arguments.runs, described)]))
+    elif described or several:
+        sys.stdout.write(json.dumps(described if several else described[0], indent=2) + "\n")
+    return int(len(described) < len(paths))
 
 
 def _logs(given: Path) -> list[Path]:
@@ -155,9 +155,9 @@ def _is_log(path: Path) -> bool:
         return False
 
 
-def _parts(given: Sequence[Path], told: Sequence[dict[str, Any]]) -> list[str]:
+def _parts(given: Sequence[Path], described: Sequence[dict[str, Any]]) -> list[str]:
     """The command that makes one log of them, where all are the parts of one recording."""
-    recordings = {about.get("metadata", {}).get("recording") for about in told}
-    if len(told) < 2 or len(recordings) > 1 or None in recordings:
+    recordings = {about.get("metadata", {}).get("recording") for about in described}
+    if len(described) < 2 or len(recordings) > 1 or None in recordings:
         return []
     return [f"parts of one recording; one log of them: fusion join {' '.join(map(str, given))} -o RUN.mcap\n"]

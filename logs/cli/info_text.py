@@ -1,4 +1,4 @@
-"""What `fusion info` found in one file, in words."""
+"""The text of `fusion info` for one file."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _log(about: Facts) -> Iterator[str]:
     yield f"anchors: {', '.join(about['anchors']) or 'none'}"
     silent = [anchor for anchor, count in about["readings"].items() if not count]
     if silent:
-        yield f"never heard: {', '.join(silent)}"
+        yield f"never received: {', '.join(silent)}"
     if about["unknown_anchors"]:
         strangers = ", ".join(f"{anchor} ({count})" for anchor, count in about["unknown_anchors"].items())
         yield f"readings of what is no anchor of the world: {strangers}"
@@ -59,14 +59,14 @@ def _log(about: Facts) -> Iterator[str]:
 
 
 def _recording(about: Facts) -> Iterator[str]:
-    """What a recorder told of its clock and its devices; nothing of logs that come from elsewhere."""
+    """The clock and the devices by a recorder; nothing for logs that come from elsewhere."""
     if clock := about["wall_clock"]:
-        yield f"began {clock['began']}{'' if clock['synced'] else ' by a wall clock that nobody keeps right'}"
+        yield f"began {clock['began']}{'' if clock['synced'] else ' by a wall clock that is not synchronised'}"
         yield from (f"the wall clock stepped by {s['by_s']:+.2f} s at {s['at_s']:.1f} s" for s in clock["steps"])
         if clock["suspended_s"] >= 1.0:
             yield f"the computer was suspended for {clock['suspended_s']:.0f} s"
-    for sensor, told in about["devices"].items():
-        yield f"  {sensor} is a {told.get('model', 'device')} {told.get('firmware', '')}".rstrip()
+    for sensor, device in about["devices"].items():
+        yield f"  {sensor} is a {device.get('model', 'device')} {device.get('firmware', '')}".rstrip()
     yield from (f"  {text} ({count} times)" for text, count in about["complaints"].items())
     yield from (f"  {sensor}: the recorder dropped {count} messages" for sensor, count in about["dropped"].items())
 
@@ -110,5 +110,5 @@ def _start(about: Facts) -> str:
 def _usability(row: Facts) -> str:
     refused = [f"{count} {reason}" for reason, count in row["refused"].items()]
     counts = [f"{row['used']} of {row['readings']} readings used", *refused] if row["readings"] else []
-    told = "; ".join([*row["lacks"], *([", ".join(counts)] if counts else [])])
-    return f"  {row['estimator']:<23} {'yes' if row['usable'] else 'no':<4} {told}".rstrip()
+    detail = "; ".join([*row["lacks"], *([", ".join(counts)] if counts else [])])
+    return f"  {row['estimator']:<23} {'yes' if row['usable'] else 'no':<4} {detail}".rstrip()

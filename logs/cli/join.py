@@ -48,7 +48,7 @@ def join(files: Sequence[Path], output: Path) -> tuple[str, ...]:
 
 
 def _common(about: Mapping[str, str]) -> dict[str, str]:
-    """What the metadata of one file say of the whole recording."""
+    """The metadata of one file that belong to the whole recording."""
     return {key: value for key, value in about.items() if key not in ("name", "world", "world_hash", "split")}
 
 

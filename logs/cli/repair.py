@@ -26,7 +26,7 @@ LOSSY = 3
 
 
 class Repaired(NamedTuple):
-    """What a repair kept of ``broken`` in ``good``, and what was wrong."""
+    """The result of a repair: the messages of ``broken`` kept in ``good``, and the damage."""
 
     broken: Path
     good: Path
@@ -34,7 +34,7 @@ class Repaired(NamedTuple):
     damage: Damage
 
     def record(self) -> dict[str, Any]:
-        """The same as plain values; times in seconds, null where nobody can tell."""
+        """The same as plain values; times in seconds, null where not known."""
         return {
             "broken": str(self.broken),
             "good": str(self.good),
@@ -45,7 +45,7 @@ class Repaired(NamedTuple):
 
 
 def repair(broken: Path, good: Path, *, force: bool = False) -> Repaired:
-    """Write what is sound in the MCAP file ``broken`` as the whole file ``good``, and tell what is lost.
+    """Write what is sound in the MCAP file ``broken`` as the whole file ``good``, and state what is lost.
 
     A file that is whole is copied with its index built anew. Raises `LogError` for what is no MCAP file, and where
     ``good`` is ``broken``, exists (unless ``force``) or cannot be written; nothing is left behind then.
@@ -77,7 +77,7 @@ def _check_place(broken: Path, good: Path, *, force: bool) -> None:
 
 
 def mend(salvage: Salvage, stream: IO[bytes]) -> None:
-    """Write what ``salvage`` finds as a whole MCAP file into ``stream``; what is lost is told in a metadata record."""
+    """Write what ``salvage`` finds as a whole MCAP file into ``stream``; a metadata record states what is lost."""
     rebuilder = Rebuilder(stream)
     for piece in salvage:
         rebuilder.add(piece)
@@ -105,7 +105,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Repair and tell; 0 where nothing is lost, 3 where something is."""
+    """Repair, and print the damage; 0 where nothing is lost, 3 where something is."""
     repaired = repair(arguments.broken, arguments.output, force=arguments.force)
     sys.stdout.write(json.dumps(repaired.record(), indent=2) + "\n" if arguments.json else _text(repaired))
     return LOSSY if repaired.damage.is_lossy else 0

@@ -22,14 +22,14 @@ from logs.message_stream import Source, Walk
 Keep = Callable[[str, Sample], bool]
 NEEDS_PROTOBUF = "its protobuf messages need the package protobuf; pip install 'fusion-localization[foxglove]'"
 FOXGLOVE = ("json", "protobuf")
-"""How messages of Foxglove's types are packed."""
+"""Encodings of messages of Foxglove's types."""
 TRANSFORM_TYPES = (TRANSFORMS, foxglove.TRANSFORM, foxglove.TRANSFORMS)
 
 
 @dataclass
 class Topic:
     """One topic: its type, how many messages arrived from when to when (log time [ns]), and the samples kept of them,
-    each with the time it arrived. ``names``: frames (``parent>child`` for transforms), anchors or joints it told of.
+    each with the time it arrived. ``names``: frames (``parent>child`` of transforms), anchors or joints.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Topic:
     names: set[str] = field(default_factory=set)
     unreadable: int = 0
     missing: str = ""
-    """What must be installed before its messages can be read."""
+    """The remedy for a package without which its messages cannot be read; "" where none is missing."""
 
     @property
     def understood(self) -> bool:
@@ -58,12 +58,12 @@ class Topic:
 
 @dataclass
 class Bag:
-    """What a bag holds. Topics by name, in the order they were met."""
+    """Content of a bag. Topics by name, in the order they were met."""
 
     path: Path
     topics: dict[str, Topic] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
-    """What of its files could not be read."""
+    """Damage of its files, a sentence each."""
     decoders: dict[Source, Decoder] = field(default_factory=dict, repr=False)
 
     def topic(self, source: Source) -> Topic:
@@ -97,7 +97,7 @@ class Bag:
 
 
 def open_bag(path: Path, *, keep: Keep) -> Bag:
-    """The bag at ``path``, with those samples that ``keep`` (told the message's type) wants; raises `LogError`."""
+    """The bag at ``path``, with those samples that ``keep`` (given the message's type) wants; raises `LogError`."""
     bag = Bag(path)
     for file in _files(path):
         walk = Walk(file)
@@ -120,7 +120,7 @@ def _files(path: Path) -> list[Path]:
 
 
 def _decoder(source: Source) -> Decoder:
-    """How the messages of an understood topic are read."""
+    """The decoder for the messages of an understood topic."""
     if source.encoding == "cdr":
         return CDR[source.type]
     if source.encoding == "json":
@@ -129,7 +129,7 @@ def _decoder(source: Source) -> Decoder:
 
 
 def _names(kind: str, sample: Sample) -> Iterable[str]:
-    """What a sample tells of."""
+    """Names of the frames, joints or anchors in a sample."""
     if isinstance(sample, PoseSample):
         return (f"{sample.parent}>{sample.child}" if kind in TRANSFORM_TYPES else sample.parent,)
     if isinstance(sample, RangeSample):

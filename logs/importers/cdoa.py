@@ -29,7 +29,7 @@ NODES = {
 REFERENCE_DISTANCE_M = 0.1
 """The runs stay within 0.1 to 3 m of the nodes, and the log-distance fit holds over all of it."""
 TIME_CORRELATION = 1.25
-"""Errors of neighbouring scans are alike: 1.6 times the fitted sigma in all, sqrt(1 + 1.25^2)."""
+"""Errors of neighbouring scans are correlated: 1.6 times the fitted sigma in all, sqrt(1 + 1.25^2)."""
 NOISE = {
     # 0.10 of a step of 0.1 m; 0.40 of a commanded turn of up to 0.8 rad in a second
     "distance_std_per_sqrt_m": 0.03,
@@ -106,29 +106,29 @@ def _time_ns(row: Row) -> int:
 
 def _odometry(rows: Sequence[Row]) -> list[Odometry]:
     """Distance from the encoder; turn from the mean of the commands at both ends of a row's second."""
-    found = []
+    increments = []
     for i, (before, row) in enumerate(itertools.pairwise(rows)):
         start, time_ns = _time_ns(before), _time_ns(row)
         distance = DISTANCE_SCALE * (row.number("robot_odom_x") - before.number("robot_odom_x"))
         turn = 0.5 * (row.number("vel_w") + before.number("vel_w")) * seconds(time_ns - start)
-        found.append(Odometry(time_ns, "odometry", i, start, distance, turn))
-    return found
+        increments.append(Odometry(time_ns, "odometry", i, start, distance, turn))
+    return increments
 
 
 def _scan(seq: int, row: Row) -> WifiScan:
     """Zero dBm or status 0 means no reading."""
-    heard = [node for node in NODES if row.number(f"rssi{node}") != 0.0 and row.number(f"status{node}") == 1.0]
-    readings = tuple(RssiReading(node, row.number(f"rssi{node}")) for node in heard)
+    received = [node for node in NODES if row.number(f"rssi{node}") != 0.0 and row.number(f"status{node}") == 1.0]
+    readings = tuple(RssiReading(node, row.number(f"rssi{node}")) for node in received)
     return WifiScan(_time_ns(row), "wifi", seq, readings)
 
 
 def _truths(rows: Sequence[Row]) -> list[Truth]:
     """Positions, but for rows in which the camera froze while the encoder moved."""
-    found = []
+    truths = []
     for before, row in zip([rows[0], *rows], rows, strict=False):
         here = (row.number("robot_pos_x"), row.number("robot_pos_y"))
         still = here == (before.number("robot_pos_x"), before.number("robot_pos_y")) and row is not before
         moved = abs(row.number("robot_odom_x") - before.number("robot_odom_x")) > FROZEN_M
         if not (still and moved):
-            found.append(Truth(_time_ns(row), *here))
-    return found
+            truths.append(Truth(_time_ns(row), *here))
+    return truths

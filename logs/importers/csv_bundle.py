@@ -37,8 +37,8 @@ def recordings(folder: Path) -> Iterator[Recording]:
         raise RecordingError(f"{folder}: none of odometry.csv, ticks.csv, ranges.csv, rssi.csv has a row; add one")
     truths = _truth(folder)
     prior, how = prior_from_truth(measurements, truths)
-    found, about = caution_of_run(world.robot, measurements, ()), {"source": "csv", "prior": how}
-    doubts = [f"{folder}: {found}"] if found else []
+    caution, about = caution_of_run(world.robot, measurements, ()), {"source": "csv", "prior": how}
+    doubts = [f"{folder}: {caution}"] if caution else []
     yield Recording(folder.resolve().name, world, prior, measurements, truths, about, warnings=doubts)
 
 

@@ -28,9 +28,9 @@ class Recording:
     truths: Sequence[Truth]
     metadata: Mapping[str, str] = field(default_factory=dict)
     arrivals_ns: Sequence[int] | None = None
-    """When each measurement, and then each truth, arrived; None: when it was true."""
+    """Times of arrival of each measurement, and then of each truth; None: those of their stamps."""
     warnings: Sequence[str] = ()
-    """What is lost or doubtful, in sentences."""
+    """Losses and doubts, a sentence each."""
 
     @property
     def doubts(self) -> list[str]:

@@ -40,7 +40,7 @@ READERS: Mapping[str, Callable[[Fields], list[Sample]]] = {
     TRANSFORM: _transform,
     TRANSFORMS: _transforms,
 }
-"""How the fields of each type are read."""
+"""Readers of the fields, by message type."""
 
 
 def _sample(message: Fields, parent: str, child: str, place: Fields, rotation: Fields) -> PoseSample:
@@ -50,7 +50,7 @@ def _sample(message: Fields, parent: str, child: str, place: Fields, rotation: F
 
 
 def _time_ns(stamp: Fields) -> int:
-    """JSON says ``sec`` and ``nsec``, protobuf ``seconds`` and ``nanos``."""
+    """JSON has ``sec`` and ``nsec``, protobuf ``seconds`` and ``nanos``."""
     second, part = ("sec", "nsec") if isinstance(stamp, SimpleNamespace) else ("seconds", "nanos")
     return int(getattr(stamp, second)) * NANOSECONDS + int(getattr(stamp, part))
 

@@ -72,7 +72,7 @@ def _truth(time_ns: int, row: Row, column: str) -> Truth:
 def _readings(
     time_ns: int, seq: int, row: Row, before: Row | None, anchors: Sequence[str]
 ) -> Iterator[Ranges | WifiScan]:
-    """What was newly measured in one row. Ranges have ten digits, so an equal one was held; whole dBm may repeat."""
+    """New measurements of one row. Ranges have ten digits, so an equal one was held; whole dBm may repeat."""
     ranges, rssi = [], []
     for anchor in anchors:
         columns = [f"{anchor} RTT Distance (m)", f"{anchor} RSS (dBm)"]

@@ -72,7 +72,7 @@ def pose_increments(topic: Topic) -> Increments:
 
 
 def wheel_increments(topic: Topic, joints: Sequence[str], robot: Robot) -> Increments:
-    """What the turning of wheels drove, by their circumference and track, with the world's distance calibration.
+    """Motion from the turning of wheels, by their circumference and track, with the world's distance calibration.
 
     Not as ticks: angles are finer than the world's ticks, and would be rounded to them. Messages without one of the
     joints are passed over.
@@ -133,12 +133,12 @@ def _chain(
         span_s = seconds(after.time_ns - before.time_ns)
         if moved.farthest_m > MAX_WHEEL_SPEED_M_S * max(span_s, SHORTEST_SPAN_S):
             jumps += 1
-            told = (0.0, 0.0, False)
+            driven = (0.0, 0.0, False)
         else:
             sideways_m += moved.sideways_m
             path_m += abs(moved.distance_m)
-            told = (moved.distance_m, moved.turn_rad, True)
-        increment = Odometry(after.time_ns, sensor, number, before.time_ns, *told)
+            driven = (moved.distance_m, moved.turn_rad, True)
+        increment = Odometry(after.time_ns, sensor, number, before.time_ns, *driven)
         rows.append((max(arrived_before_ns, arrived_ns), increment))
     warnings = [f"{sensor}: jumps {jumps} times, as if started anew; that motion is not measured"] if jumps else []
     if sideways_m > SIDEWAYS_SHARE * path_m:

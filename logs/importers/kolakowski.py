@@ -39,7 +39,7 @@ PATH_LOSS = {
 }
 POOLED = (-46.8, 2.08, 7.03)
 TIME_CORRELATION = 1.25
-"""Errors of neighbouring readings are alike: 1.6 times the fitted sigma in all, sqrt(1 + 1.25^2)."""
+"""Errors of neighbouring readings are correlated: 1.6 times the fitted sigma in all, sqrt(1 + 1.25^2)."""
 RSSI_COLUMNS = {"rssi_3": "1", "rssi_4": "2", "rssi_5": "3", "rssi_8": "4", "rssi_10": "5", "rssi_11": "6"}
 NOISE = {
     # 0.20 of a step of 0.03 m; 0.40 of a commanded turn of 0.4 rad (a third of a second)
@@ -51,7 +51,7 @@ NOISE = {
     "turn_scale_std": 0.05,
 }
 LAST_GOOD_NS = 1628001747456333000
-"""Where the publication stops using the third run; what follows in that file is left out here too."""
+"""Time at which the publication stops using the third run; what follows in that file is left out here too."""
 
 
 def recordings(folder: Path) -> Iterator[Recording]:
@@ -94,8 +94,8 @@ def _truth(row: Row) -> Truth:
 
 
 def _scan(seq: int, row: Row) -> WifiScan:
-    heard = [(anchor, row.number(name)) for name, anchor in RSSI_COLUMNS.items() if row.text(name)]
-    return WifiScan(_time_ns(row), "ble", seq, tuple(RssiReading(anchor, rssi) for anchor, rssi in heard))
+    received = [(anchor, row.number(name)) for name, anchor in RSSI_COLUMNS.items() if row.text(name)]
+    return WifiScan(_time_ns(row), "ble", seq, tuple(RssiReading(anchor, rssi) for anchor, rssi in received))
 
 
 def _odometry(path: Path, start_ns: int, end_ns: int) -> list[Odometry]:
@@ -104,7 +104,7 @@ def _odometry(path: Path, start_ns: int, end_ns: int) -> list[Odometry]:
     edges = {start_ns, end_ns, *(time for time, _ in commands if start_ns < time < end_ns)}
     edges.update(range(start_ns, end_ns, STEP_NS))
     times = sorted(edges)
-    found, current = [], "stop"
+    increments, current = [], "stop"
     upcoming = iter([*commands, (end_ns + 1, "stop")])
     following = next(upcoming)
     for i, (before, time) in enumerate(itertools.pairwise(times)):
@@ -113,8 +113,8 @@ def _odometry(path: Path, start_ns: int, end_ns: int) -> list[Odometry]:
             following = next(upcoming, (end_ns + 1, "stop"))
         speed, rate = SPEEDS[current]
         span_s = seconds(time - before)
-        found.append(Odometry(time, "commands", i, before, speed * span_s, rate * span_s))
-    return found
+        increments.append(Odometry(time, "commands", i, before, speed * span_s, rate * span_s))
+    return increments
 
 
 def _commands(path: Path) -> list[tuple[int, str]]:
@@ -122,15 +122,15 @@ def _commands(path: Path) -> list[tuple[int, str]]:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise RecordingError(f"{path}: cannot be read ({error}); it belongs beside the _df.csv") from error
-    found = []
+    commands = []
     for number, line in enumerate(lines, 1):
         parts = line.split(",")
         if not line.strip():
             continue
         if len(parts) < 2 or parts[1] not in SPEEDS:
             raise RecordingError(f"{path}:{number}: {line!r} is no command; expected time,{'|'.join(SPEEDS)},speed")
-        found.append((exact_ns(parts[0], f"{path}:{number}"), parts[1]))
-    return found
+        commands.append((exact_ns(parts[0], f"{path}:{number}"), parts[1]))
+    return commands
 
 
 def _world(name: str, path: Path, drive: str) -> World:

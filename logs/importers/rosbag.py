@@ -1,4 +1,4 @@
-"""A ROS 2 bag in MCAP, of anybody's making, as a run. `docs/import.md` says what each role reads.
+"""A ROS 2 bag in MCAP, of anybody's making, as a run. `docs/import.md` lists what each role reads.
 
 The stamp in a message's header is the time it was true, the log time when it arrived. Every measurement carries its
 topic as the sensor's name, and is numbered per topic.
@@ -42,16 +42,16 @@ def read_bag(
     the truth in the map (x [m], y [m], heading [rad]). Raises `LogError` for what holds no run, `ParameterError` for a
     role or topic that there is not, or that could be several.
     """
-    found = read_recording(path, world, topics, truth_to_map=truth_to_map)
+    recording = read_recording(path, world, topics, truth_to_map=truth_to_map)
     return Run(
         path=path,
-        name=found.name,
+        name=recording.name,
         world=world,
-        prior=found.prior,
-        metadata=found.metadata,
-        measurements=tuple(found.measurements),
-        truth=TruthTrack.from_truths(found.truths) or None,
-        warnings=tuple(found.doubts),
+        prior=recording.prior,
+        metadata=recording.metadata,
+        measurements=tuple(recording.measurements),
+        truth=TruthTrack.from_truths(recording.truths) or None,
+        warnings=tuple(recording.doubts),
         lanes={},
     )
 
@@ -70,14 +70,14 @@ def recordings(
 def need_world(path: Path | None) -> World:
     """The world in a file; raises `ParameterError` when none is given, `WorldError` for one that cannot be read."""
     if path is None:
-        raise ParameterError("a bag does not say where its anchors are: give --world WORLD.toml (docs/world.md)")
+        raise ParameterError("a bag does not hold the places of its anchors: give --world WORLD.toml (docs/world.md)")
     return World.load(path)
 
 
 def read_recording(
     path: Path, world: World, topics: Mapping[str, str], *, truth_to_map: Sequence[float] = TRUTH_IS_MAP
 ) -> Recording:
-    """What `read_bag` reads, with the times of arrival."""
+    """`read_bag`, with the times of arrival."""
     bag = open_bag(path, keep=_keeper(truth_frames(topics)))
     assignment = assign(bag, world, topics)
     measurements, warnings = _measurements(bag, assignment, world)
@@ -142,16 +142,16 @@ def _measurements(bag: Bag, assignment: TopicAssignment, world: World) -> tuple[
             rows += _radio(topic, "")
         elif role != "truth":
             wheels = role == "wheels"
-            found = wheel_increments(topic, assignment.joints, world.robot) if wheels else pose_increments(topic)
-            rows += found.rows
-            warnings += found.warnings
+            increments = wheel_increments(topic, assignment.joints, world.robot) if wheels else pose_increments(topic)
+            rows += increments.rows
+            warnings += increments.warnings
     for name, anchor in assignment.ranges:
         rows += _radio(bag.topics[name], anchor)
     return rows, warnings
 
 
 def _radio(topic: Topic, anchor: str) -> Arrived[Measurement]:
-    """What each message of a topic measured; a range by the frame of its message, or the ``anchor`` it is known for."""
+    """Measurements of a topic's messages; a range by the frame of its message, or the ``anchor`` it is known for."""
     rows: Arrived[Measurement] = []
     for number, (arrived_ns, sample) in enumerate(topic.samples):
         if isinstance(sample, RangeSample):
@@ -174,7 +174,7 @@ def _truths(bag: Bag, assignment: TopicAssignment, map_from_truth: Pose) -> Arri
 
 
 def _doubts(bag: Bag, assignment: TopicAssignment, world: World, topics: Mapping[str, str]) -> Iterator[str]:
-    """What may be missing or wrong, a sentence each."""
+    """Warnings of what may be missing or wrong, a sentence each."""
     ids = {anchor.id for anchor in world.anchors}
     named = dict(assignment.ranges)
     for topic in bag.topics.values():
@@ -185,7 +185,7 @@ def _doubts(bag: Bag, assignment: TopicAssignment, world: World, topics: Mapping
             yield f"all messages of {topic.name} carry one and the same stamp; let its driver stamp them"
         strangers = ", ".join(sorted(name or '""' for name in topic.names - ids))
         if topic.type in ROLES["range"] and not named.get(topic.name) and strangers:
-            yield f"{topic.name} tells ranges of what is no anchor of the world ({strangers}); name it range.ANCHOR"
+            yield f"{topic.name} has ranges of what is no anchor of the world ({strangers}); name it range.ANCHOR"
     could = [topic.name for topic in bag.topics.values() if topic.type in ROLES["truth"] and topic.type != ODOMETRY]
     if could and "truth" not in topics:
         yield f"no truth is named, so errors cannot be scored; it may be in {' or '.join(could)}"

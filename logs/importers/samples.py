@@ -1,7 +1,7 @@
-"""What the messages of other people's topics say, in a few small values: the standard ROS 2 types, read from CDR.
+"""Messages of foreign topics as a few small values: the standard ROS 2 types, read from CDR.
 
-A sample is what a message tells before anybody decided what it is for; `logs.importers.rosbag` makes measurements and
-truth of it. Fields of no use are passed over. A message that is cut off, or tells no number where one is needed,
+A sample is the content of a message before a role is assigned to its topic; `logs.importers.rosbag` makes measurements
+and truth of it. Fields of no use are passed over. A message that is cut off, or holds no number where one is needed,
 raises.
 """
 
@@ -18,7 +18,7 @@ from logs.messages import DECODERS, take_header, take_pose
 
 
 class PoseSample(NamedTuple):
-    """Where the frame ``child`` (may be "") is in the frame ``parent``; heading None when not known, x and y NaN."""
+    """Pose of the frame ``child`` (may be "") in the frame ``parent``; heading None when not known, x and y NaN."""
 
     time_ns: int
     parent: str
@@ -75,11 +75,11 @@ def _pose(data: bytes, *, has_child: bool = False) -> list[Sample]:
 
 def _transforms(data: bytes) -> list[Sample]:
     cursor = Unpacker(data)
-    found: list[Sample] = []
+    samples: list[Sample] = []
     for _ in range(cursor.whole()):
         (time_ns, parent), child = take_header(cursor), cursor.text()
-        found.append(pose_sample(time_ns, parent, child, *take_pose(cursor)))
-    return found
+        samples.append(pose_sample(time_ns, parent, child, *take_pose(cursor)))
+    return samples
 
 
 def _joints(data: bytes) -> list[Sample]:
@@ -129,4 +129,4 @@ CDR: Mapping[str, Decoder] = {
     RANGE: _range,
     **{schema: partial(_own, schema=schema) for schema in (IMU, RANGES, WIFI)},
 }
-"""How a CDR message of each type is read."""
+"""Decoders of CDR messages, by type."""

@@ -130,7 +130,7 @@ def _named(bag: Bag, role: str, name: str, kinds: tuple[str, ...]) -> Topic:
     topic = bag.topics[name]
     if topic.type in TRANSFORM_TYPES and role == "truth":
         pairs = ", ".join(sorted(topic.names))
-        raise ParameterError(f"{bag.path}: truth: {name} holds transforms ({pairs}); say which: {AS_FRAMES}")
+        raise ParameterError(f"{bag.path}: truth: {name} holds transforms ({pairs}); name one: {AS_FRAMES}")
     if topic.type not in kinds:
         raise ParameterError(f"{bag.path}: {role}: {name} is of the type {topic.type}, and not {' or '.join(kinds)}")
     if not topic.understood:
@@ -145,12 +145,12 @@ def _named(bag: Bag, role: str, name: str, kinds: tuple[str, ...]) -> Topic:
 def _transforms(bag: Bag, pair: str) -> list[str]:
     """Every topic that holds the transform ``parent>child``."""
     all_transforms = [topic for topic in bag.topics.values() if topic.type in TRANSFORM_TYPES]
-    found = [topic.name for topic in all_transforms if pair in topic.names]
-    if not found:
+    names = [topic.name for topic in all_transforms if pair in topic.names]
+    if not names:
         pairs = {name for topic in all_transforms for name in topic.names}
         hint = next((topic.missing for topic in all_transforms if topic.missing), "") or did_you_mean(pair, pairs)
         raise ParameterError(f"{bag.path}: truth: no message transforms {pair} (transforms are not chained); {hint}")
-    return found
+    return names
 
 
 def _assign_by_type(
@@ -174,15 +174,15 @@ def _assign_by_type(
 
 def _anchored(bag: Bag, anchors: set[str], free: Sequence[Topic]) -> list[tuple[str, str]]:
     """Topics whose ranges are of these anchors only: a sonar's are not."""
-    found = [topic for topic in free if topic.type in ROLES["range"] and topic.names and topic.names <= anchors]
+    topics = [topic for topic in free if topic.type in ROLES["range"] and topic.names and topic.names <= anchors]
     for anchor in sorted(anchors):
-        rivals = [topic.name for topic in found if anchor in topic.names]
+        rivals = [topic.name for topic in topics if anchor in topic.names]
         if len(rivals) > 1:
             raise _ambiguous(bag, ANCHOR + anchor, rivals)
-    return [(topic.name, "") for topic in found]
+    return [(topic.name, "") for topic in topics]
 
 
 def _ambiguous(bag: Bag, role: str, names: Sequence[str]) -> ParameterError:
     return ParameterError(
-        f"{bag.path}: {role} could be {' or '.join(names)}; say which with {role}={names[0]}, or {role}={NO_TOPIC}"
+        f"{bag.path}: {role} could be {' or '.join(names)}; choose one with {role}={names[0]}, or {role}={NO_TOPIC}"
     )

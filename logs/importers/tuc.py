@@ -85,14 +85,14 @@ def _odometry(path: Path, rows: list[Fields]) -> list[Odometry]:
     times = [exact_ns(row[1] if len(row) > 1 else "", place) for place, row in rows]
     if len(times) < 2:
         raise RecordingError(f"{path}: fewer than two odom2diff rows; give a recording with odometry")
-    found = []
+    increments = []
     for i, (place, row) in enumerate(rows):
         left, right = _numbers(place, row, 2, 3)
         start = times[i - 1] if i else 2 * times[0] - times[1]
         span_s = seconds(times[i] - start)
         turn = (right - left) / TRACK_WIDTH_M * span_s
-        found.append(Odometry(times[i], "odometry", i, start, 0.5 * (left + right) * span_s, turn))
-    return found
+        increments.append(Odometry(times[i], "odometry", i, start, 0.5 * (left + right) * span_s, turn))
+    return increments
 
 
 def _truths(path: Path) -> list[Truth]:

@@ -1,4 +1,4 @@
-"""What is missing of a damaged file, in numbers and in one sentence: how many bytes, and how many seconds of the run.
+"""Losses of a damaged file, in numbers and in one sentence: bytes, and seconds of the run.
 
 Bytes can be counted. Seconds can only be bounded: a hole lies between the last stamp before it and the first one after
 it. What followed the end of a file that was cut off stands nowhere, but a writer that is known to flush each second
@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 
 from fusion.values import seconds
 
-TOLD = 3
-"""Holes named one by one in a sentence; of more only the number is told."""
+NAMED = 3
+"""Holes named one by one in a sentence; of more only the number is stated."""
 
 
 class Hole(NamedTuple):
     """Bytes from ``start`` up to ``end`` of a file that cannot be used, why, and what is known of their time: the last
     stamp kept before, the first one kept after (both log time [ns]). For a hole that the file ends with, ``until_ns``
-    is None, and ``told_ns`` what the head of a half written chunk says of its last message.
+    is None, and ``stated_ns`` the time of the last message by the head of a half written chunk.
     """
 
     start: int
@@ -27,7 +27,7 @@ class Hole(NamedTuple):
     why: str
     from_ns: int | None
     until_ns: int | None = None
-    told_ns: int | None = None
+    stated_ns: int | None = None
 
     @property
     def seconds(self) -> float | None:
@@ -49,10 +49,10 @@ class Damage(NamedTuple):
     missing: int | None
     """Messages that the file's own statistics count and that are not there; None where there are none."""
     first_ns: int | None
-    """Where the kept stamps begin (log time); seconds in sentences count from here."""
+    """First stamp kept (log time); seconds in sentences count from here."""
     writer: str
     flush_ns: int | None
-    """How often the writer hands over to the system what it has; None for one that is not known to."""
+    """Period at which the writer hands over what it has to the system; None for one that is not known to."""
 
     @property
     def is_lossy(self) -> bool:
@@ -66,13 +66,13 @@ class Damage(NamedTuple):
 
     @property
     def seconds_lost(self) -> float | None:
-        """The most that is lost [s], for a cut-off log if its recorder stopped there; None: nobody can tell."""
+        """The most that is lost [s], for a cut-off log if its recorder stopped there; None: not known."""
         bounds = [self._bound(hole) for hole in self.holes]
         return None if None in bounds else sum((bound for bound in bounds if bound is not None), 0.0)
 
     def _bound(self, hole: Hole) -> float | None:
         if hole is self._tail and self.flush_ns is not None and hole.from_ns is not None:
-            return seconds(max(self.flush_ns, (hole.told_ns or 0) - hole.from_ns))
+            return seconds(max(self.flush_ns, (hole.stated_ns or 0) - hole.from_ns))
         return hole.seconds
 
     @property
@@ -90,12 +90,12 @@ class Damage(NamedTuple):
         if self.missing:
             what.append(f"{self.missing} messages that its index counts are lost")
         inner = [hole for hole in self.holes if hole is not self._tail]
-        what += [self._between(hole) for hole in inner] if len(inner) <= TOLD else [self._many(inner)]
+        what += [self._between(hole) for hole in inner] if len(inner) <= NAMED else [self._many(inner)]
         what += [self._after(self._tail)] if self._tail else []
         return ("cut off: " if self._tail else "damaged: ") + "; ".join(what)
 
     def record(self) -> dict[str, Any]:
-        """The same as plain values: times in seconds since the first stamp kept, None where nobody can tell."""
+        """The same as plain values: times in seconds since the first stamp kept, None where not known."""
         return {
             "damage": str(self),
             "bytes": self.size,
@@ -111,7 +111,7 @@ class Damage(NamedTuple):
                     "why": hole.why,
                     "from_s": self._since(hole.from_ns),
                     "until_s": self._since(hole.until_ns),
-                    "told_s": self._since(hole.told_ns),
+                    "stated_s": self._since(hole.stated_ns),
                 }
                 for hole in self.holes
             ],
@@ -138,6 +138,6 @@ class Damage(NamedTuple):
         bound = self._bound(hole)
         if bound is not None:
             return f"at most {bound:.1f} s lost {where}, if the recorder stopped there (it flushes each second)"
-        told = hole.told_ns is not None and hole.from_ns is not None
-        least = f", at least {seconds((hole.told_ns or 0) - (hole.from_ns or 0)):.1f} s" if told else ""
+        is_stated = hole.stated_ns is not None and hole.from_ns is not None
+        least = f", at least {seconds((hole.stated_ns or 0) - (hole.from_ns or 0)):.1f} s" if is_stated else ""
         return f"an unknown time lost {where}{least}: its writer {self.writer!r} is not known to flush"

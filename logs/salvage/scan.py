@@ -1,6 +1,6 @@
 """The sound records of an MCAP file and what is damaged between them: one walk, for reading and for repair.
 
-A damaged chunk costs that chunk only: the walk goes on where its length says the next record begins, if one stands
+A damaged chunk costs that chunk only: the walk goes on where the next record begins by its length, if one stands
 there, or else at the next place that the file's index knows. It ends at a length beyond the file (the placeholder of a
 chunk that was being written is 2^64 - 1), at zeros, and wherever nothing sound follows. Everything is checked that
 carries a check: the CRC of chunks, attachments and the whole, the lengths inside every record, and the channels.
@@ -69,7 +69,7 @@ class Salvage:
 
     @property
     def damage(self) -> Damage:
-        """What is wrong with the file, as far as the walk has come."""
+        """Damage of the file, as far as it was walked."""
         statistics = self._summary and self._summary.statistics
         return Damage(
             size=self._size,
@@ -83,7 +83,7 @@ class Salvage:
         )
 
     def _end(self, at: int) -> int | None:
-        """Where the record at ``at`` ends by its own length; None where no record can stand."""
+        """End of the record at ``at`` by its own length; None where no record can stand."""
         self._stream.seek(at)
         head = ExactStream(BytesIO(self._stream.read(HEAD)))
         try:
@@ -150,9 +150,9 @@ class Salvage:
         """Note a hole at ``at`` and answer where the walk goes on, if anywhere."""
         places = chain([self._end(at)], (place for place in self._places if place > at))
         following = next((place for place in places if place and self._stands_at(place)), None)
-        told_ns = self._told(at) if following is None else None
+        stated_ns = self._stated_ns(at) if following is None else None
         end = self._size if following is None else following
-        self._holes.append(Hole(at, end, type(error).__name__, self._last_ns, told_ns=told_ns))
+        self._holes.append(Hole(at, end, type(error).__name__, self._last_ns, stated_ns=stated_ns))
         return following
 
     def _stands_at(self, place: int) -> bool:
@@ -161,8 +161,8 @@ class Salvage:
         opcode = self._stream.read(1)
         return bool(opcode) and (opcode[0] in PARSERS or opcode[0] == Opcode.MESSAGE) and self._end(place) is not None
 
-    def _told(self, at: int) -> int | None:
-        """What the head of a half written chunk says of its last message, where that can be."""
+    def _stated_ns(self, at: int) -> int | None:
+        """Time of the last message by the head of a half written chunk, None where it cannot be one."""
         self._stream.seek(at)
         head = ExactStream(BytesIO(self._stream.read(HEAD + 16)))
         try:

@@ -62,8 +62,8 @@ def test_date_in_a_world_file_is_refused(text):
 @pytest.mark.parametrize(
     "wrong", [WheelTicks(1, "wheels", 1, (1,)), WheelTicks(1, "wheels", 1, ()), MotorCommand(1, "motors", 1, (0.1,))]
 )
-def test_wrong_number_of_wheels_is_told_with_both_numbers(wrong):
-    with pytest.raises(MeasurementError, match=r"tells of \d wheels, the world's skid_steer drive has 4"):
+def test_wrong_number_of_wheels_is_refused_with_both_numbers(wrong):
+    with pytest.raises(MeasurementError, match=r"has \d wheels, the world's skid_steer drive has 4"):
         fold(wrong)
 
 

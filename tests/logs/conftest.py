@@ -3,7 +3,7 @@
 import pytest
 from rosbags.typesys import Stores
 
-from tests.logs.foreign_bags import Ros
+from tests.logs.importers.foreign_bags import Ros
 
 
 @pytest.fixture(scope="session")

@@ -82,7 +82,7 @@ def test_estimate_comes_back_with_what_it_does_not_claim(tmp_path):
 )
 def test_what_no_message_can_hold_is_the_estimators_fault_and_the_log_goes_on(tmp_path, estimate):
     with RunWriter(tmp_path / "run.mcap", WORLD, name="test") as log:
-        with pytest.raises(PluginError, match="odd_one: what it said to 'gyro' at 1000000000 ns fits no message"):
+        with pytest.raises(PluginError, match="odd_one: its update by 'gyro' at 1000000000 ns fits no message"):
             log.write_update("odd_one", Update(gyro(SECOND), estimate, ()))
         log.write(gyro(2 * SECOND))
     run = read_run(tmp_path / "run.mcap")

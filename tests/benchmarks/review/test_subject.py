@@ -16,7 +16,7 @@ from fusion import WheelTicks, WifiScan
 from fusion.cli.main import main
 from sensors.simulation.scenario import load_scenario
 from sensors.simulation.simulate import simulate, simulated_run
-from tests.logs.foreign_bags import Ros
+from tests.logs.importers.foreign_bags import Ros
 
 EPOCH_NS = 1_700_000_000_000_000_000
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")

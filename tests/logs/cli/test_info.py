@@ -249,7 +249,7 @@ def test_what_is_missing_is_named_estimator_by_estimator(tmp_path, capsys):
     assert main(["info", str(tmp_path / "two.mcap")]) == 0
     text = capsys.readouterr().out
     assert "radio_only              no   no reading of the replay enters it; 0 of 12 readings used, 12 too" in text
-    assert "never heard: c" in text
+    assert "never received: c" in text
 
 
 def test_truth_gives_a_start_where_the_log_has_none_of_its_own(tmp_path):

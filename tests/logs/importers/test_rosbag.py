@@ -204,14 +204,14 @@ def test_ranges_of_no_anchor_are_left_out_and_told_unless_they_are_named(tmp_pat
     bag = ros.bag(tmp_path / "bag", rows)
     run = read_bag(bag, WORLD)
     assert [scan.sensor for scan in run.measurements] == ["/uwb"]
-    assert "/sonar tells ranges of what is no anchor of the world (bumper)" in run.warnings[0]
+    assert "/sonar has ranges of what is no anchor of the world (bumper)" in run.warnings[0]
     assert [scan.readings[0].anchor for scan in read_bag(bag, WORLD, {"range": "/sonar"}).measurements] == ["bumper"]
 
 
 def test_anchor_that_two_topics_range_to_is_refused_until_one_is_named(tmp_path, ros):
     rows = [(topic, SECOND, ros.range(SECOND, name, 1.0)) for topic, name in (("/a", "a"), ("/a2", "a"), ("/b", "b"))]
     bag = ros.bag(tmp_path / "bag", rows)
-    with pytest.raises(ParameterError, match=r"range\.a could be /a or /a2; say which"):
+    with pytest.raises(ParameterError, match=r"range\.a could be /a or /a2; choose one"):
         read_bag(bag, WORLD)
     assert [scan.sensor for scan in read_bag(bag, WORLD, {"range.a": "/a2"}).measurements] == ["/a2", "/b"]
     assert [scan.sensor for scan in read_bag(bag, WORLD, {"range.a": "none"}).measurements] == ["/b"]
@@ -300,7 +300,7 @@ def test_truth_is_never_guessed_and_its_candidates_are_told(tmp_path, ros, drive
         ({"gyro": "/odom"}, "/odom is of the type nav_msgs/msg/Odometry, and not sensor_msgs/msg/Imu"),
         ({"truth": "tf:map>base"}, r"no message transforms map>base .*; did you mean 'map>base_link'"),
         ({"truth": "tf:map"}, "does not name two frames; write it as 'truth=tf:map>base_link', in quotes"),
-        ({"truth": "/tf"}, r"/tf holds transforms \(map>base_link\); say which: write it as 'truth="),
+        ({"truth": "/tf"}, r"/tf holds transforms \(map>base_link\); name one: write it as 'truth="),
         ({"truth": "/odom", "odom": "/odom"}, "/odom is named for two roles"),
         ({"range.a": "/uwb/a", "range.b": "/uwb/a"}, "/uwb/a is named for two roles"),
     ],
@@ -317,7 +317,7 @@ def test_role_that_two_topics_could_play_is_refused_until_one_is_named_or_none(t
         row for row in drive if row[0] == {"odom": "/odom", "gyro": "/imu/data"}.get(role, "/wifi")
     )
     bag = ros.bag(tmp_path / "bag", [*drive, ("/other", log_ns, message)])
-    with pytest.raises(ParameterError, match=f"{role} could be {topic} or /other; say which with {role}={topic}"):
+    with pytest.raises(ParameterError, match=f"{role} could be {topic} or /other; choose one with {role}={topic}"):
         read_bag(bag, WORLD)
     assert f"{role}=/other" in read_bag(bag, WORLD, {role: "/other"}).metadata["topics"]
     assert f"{role}=" not in read_bag(bag, WORLD, {role: "none"}).metadata["topics"]

@@ -11,7 +11,7 @@ from fusion import Increment, Odometry, PluginError, Ranges, RecordingError, Wif
 from logs.cli.import_ import import_recordings
 from logs.reader import read_run
 
-DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
+DATA = Path(__file__).resolve().parents[3].parent / "shared" / "data"
 FOLDERS = {
     "tuc": "tuc_labyrinth_uwb",
     "plaza": "plaza",
