@@ -10,9 +10,9 @@ their order does not matter (Bar-Shalom, Li & Kirubarajan 2001, section 5.4 and 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
-
-import numpy as np
 
 from fusion import (
     Covariance,
@@ -33,22 +33,34 @@ from fusion import (
     radio_readings,
     wrap_angle,
 )
-from fusion.arrays import Floats
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.correlated_error import correlated_count_of, require_max_correlated
 from fusion.fates import chi_square_gate
 from fusion.radio import PathLoss, Ranging
 
-POSE, CALIBRATION = slice(0, 3), slice(3, 6)
-HEADING = 2
+POSE = 3
+"""States of the pose, which come first; then those of the odometry's calibration."""
+UNCALIBRATED = (0.0, 0.0, 0.0)
+
+Row = list[float]
 
 
 class State(NamedTuple):
-    """The belief, and the path driven since the last scan; arrays are never written to."""
+    """The belief, and the path driven since the last scan; nothing in it is written to. ``anchors``: the anchors and
+    kinds of readings whose common errors are its last states, in the order in which they were first received.
+    """
 
-    mean: Floats
-    covariance: Floats
+    mean: Row
+    covariance: list[Row]
     path_m: float
+    anchors: tuple[tuple[str, type], ...]
+
+
+class AnchorError(NamedTuple):
+    """Common error of one anchor's readings: its variance, and the path after which it is forgotten [m]."""
+
+    variance: float
+    length_m: float
 
 
 class Ekf:
@@ -108,120 +120,198 @@ class Ekf:
             if model.gain_std > 0.0 and type(model) not in self._gain_index:
                 self._gain_index[type(model)] = 3 + len(stds)
                 stds.append(model.gain_std)
-        self._first_bias = 3 + len(stds)
-        self._bias_index: dict[tuple[str, type], int] = {}
+        self._variances = [std * std for std in stds]
         self._lengths_m = {PathLoss: rssi_bias_length_m, Ranging: range_bias_length_m}
-        kept_m = []
+        self._anchor_errors: dict[tuple[str, type], AnchorError] = {}
         wanted = {PathLoss: estimate_rssi_bias, Ranging: estimate_range_bias}
         for anchor_id, model in models:
             known_m, asked = model.bias_length_m, wanted[type(model)]
             if model.bias_std > 0.0 and (known_m is not None if asked is None else asked):
-                self._bias_index[anchor_id, type(model)] = 3 + len(stds)
-                stds.append(model.bias_std)
-                kept_m.append(known_m or self._lengths_m[type(model)])
-        self._extra_variance = np.square(np.array(stds))
-        self._bias_length_m = np.array(kept_m)
+                length_m = known_m or self._lengths_m[type(model)]
+                self._anchor_errors[anchor_id, type(model)] = AnchorError(model.bias_std**2, length_m)
 
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
         """The prior, with every calibration error at zero."""
-        pose, pose_covariance = starting_belief(self._world, prior)
-        size = 3 + len(self._extra_variance)
-        mean, covariance = np.zeros(size), np.zeros((size, size))
-        mean[POSE] = pose
-        covariance[POSE, POSE] = pose_covariance.matrix
-        covariance[range(3, size), range(3, size)] = self._extra_variance
-        return State(mean, covariance, 0.0)
+        pose, covariance = starting_belief(self._world, prior)
+        mean, rows = _with_states(list(pose), [list(row) for row in covariance.matrix], self._variances)
+        return State(mean, rows, 0.0, ())
 
     def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
         """Compose the motion; update by the readings."""
-        mean, covariance = self._moved(state, motion)
-        path_m = state.path_m + motion.path_m
-        if scan is None:
-            return _state(mean, covariance, path_m), ()
-        return self._updated(mean, covariance, path_m, scan)
+        moved = self._moved(state, motion)
+        return (moved, ()) if scan is None else self._updated(moved, scan)
 
     def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
         """The pose after the motion since; nothing but pose and calibration moves it."""
-        mean, spread = state.mean[POSE].tolist(), state.covariance[POSE, POSE]
+        x, y, heading, *_ = state.mean
+        (xx, xy, xh, *_), (_, yy, yh, *_), (_, _, hh, *_), *_ = state.covariance
+        covariance = Covariance(xx, xy, xh, yy, yh, hh)
         if motion.duration_s > 0.0:
-            step, rows = self._move(state.mean, motion)
-            size = rows.shape[1]
-            mean = [mean[0] + step.dx, mean[1] + step.dy, mean[2] + step.turn]
-            spread = rows @ state.covariance[:size, :size] @ rows.T + step.noise.matrix
-        covariance = Covariance.from_matrix(spread.tolist())
-        pose = Pose(mean[0], mean[1], wrap_angle(mean[2]))
-        return Estimate(time_ns, pose, covariance, heading_known=covariance.hh < HEADING_KNOWN_STD**2)
+            step = self._move(state.mean, motion)
+            size = 2 * POSE if self._calibrated else POSE
+            covariance = self._corner(self._top(step, [row[:size] for row in state.covariance[:size]]), step)
+            x, y, heading = x + step.dx, y + step.dy, wrap_angle(heading + step.turn)
+        known = covariance.hh < HEADING_KNOWN_STD**2
+        return Estimate(time_ns, Pose(x, y, heading), covariance, True, known)
 
-    def _move(self, mean: Floats, motion: Increment) -> tuple[Move, Floats]:
-        """The move of the pose, and its Jacobian by the leading block of the state (pose, calibration): (3, 3 or 6)."""
-        errors = mean[CALIBRATION].tolist() if self._calibrated else (0.0, 0.0, 0.0)
-        step = move(float(mean[HEADING]), motion, *errors)
-        rows = (
-            (1.0, 0.0, -step.dy, *step.x_by_errors),
-            (0.0, 1.0, step.dx, *step.y_by_errors),
-            (0.0, 0.0, 1.0, *step.turn_by_errors),
+    def _move(self, mean: Row, motion: Increment) -> Move:
+        return move(mean[2], motion, *mean[POSE : 2 * POSE]) if self._calibrated else move(mean[2], motion)
+
+    def _top(self, step: Move, rows: Sequence[Row]) -> tuple[Row, Row, Row]:
+        """F P for the rows of the pose: its Jacobian by the pose and by the errors of the odometry times ``rows``."""
+        dx, dy = step.dx, step.dy
+        if not self._calibrated:
+            first, second, third = rows[:POSE]
+            return (
+                [x - dy * h for x, h in zip(first, third)],
+                [y + dx * h for y, h in zip(second, third)],
+                third,
+            )
+        (a, b, c), (d, e, f), (_, g, k) = step.x_by_errors, step.y_by_errors, step.turn_by_errors
+        first, second, third, *errors = rows[: 2 * POSE]
+        return (
+            [x - dy * h + a * s + b * t + c * u for x, h, s, t, u in zip(first, third, *errors)],
+            [y + dx * h + d * s + e * t + f * u for y, h, s, t, u in zip(second, third, *errors)],
+            [h + g * t + k * u for h, t, u in zip(third, *errors[1:])],
         )
-        return step, np.array(rows)[:, : 6 if self._calibrated else 3]
 
-    def _moved(self, state: State, motion: Increment) -> tuple[Floats, Floats]:
-        """Mean and covariance after ``motion``: P <- F P Fᵀ + Q, where F is the identity but for the rows of the pose
-        and the fading of the anchors' errors.
+    def _corner(self, top: tuple[Row, Row, Row], step: Move) -> Covariance:
+        """F P Fᵀ + Q for the pose, from its rows of F P."""
+        by_x, by_y, by_h = top
+        dx, dy, noise = step.dx, step.dy, step.noise
+        if not self._calibrated:
+            return Covariance(
+                by_x[0] - dy * by_x[2] + noise.xx,
+                by_x[1] + dx * by_x[2] + noise.xy,
+                by_x[2] + noise.xh,
+                by_y[1] + dx * by_y[2] + noise.yy,
+                by_y[2] + noise.yh,
+                by_h[2] + noise.hh,
+            )
+        (a, b, c), (d, e, f), (_, g, k) = step.x_by_errors, step.y_by_errors, step.turn_by_errors
+        return Covariance(
+            by_x[0] - dy * by_x[2] + a * by_x[3] + b * by_x[4] + c * by_x[5] + noise.xx,
+            by_x[1] + dx * by_x[2] + d * by_x[3] + e * by_x[4] + f * by_x[5] + noise.xy,
+            by_x[2] + g * by_x[4] + k * by_x[5] + noise.xh,
+            by_y[1] + dx * by_y[2] + d * by_y[3] + e * by_y[4] + f * by_y[5] + noise.yy,
+            by_y[2] + g * by_y[4] + k * by_y[5] + noise.yh,
+            by_h[2] + g * by_h[4] + k * by_h[5] + noise.hh,
+        )
+
+    def _moved(self, state: State, motion: Increment) -> State:
+        """The state after ``motion``: P <- F P Fᵀ + Q, where F is the identity but for the rows of the pose and the
+        fading of the anchors' errors, which are forgotten up to their own variance.
         """
         if motion.duration_s == 0.0:
-            return state.mean, state.covariance
-        step, rows = self._move(state.mean, motion)
-        mean, covariance = state.mean.copy(), state.covariance.copy()
-        mean[POSE] += (step.dx, step.dy, step.turn)
-        top = rows @ covariance[: rows.shape[1]]
-        covariance[POSE], covariance[:, POSE] = top, top.T
-        covariance[POSE, POSE] = top[:, : rows.shape[1]] @ rows.T + step.noise.matrix
-        kept = np.exp(-motion.path_m / self._bias_length_m)
-        first, biases = self._first_bias, range(self._first_bias, len(mean))
-        mean[first:] *= kept
-        covariance[first:] *= kept[:, None]
-        covariance[:, first:] *= kept
-        covariance[biases, biases] += (1.0 - kept * kept) * self._extra_variance[first - 3 :]
-        return mean, covariance
+            return state
+        errors = [self._anchor_errors[anchor] for anchor in state.anchors]
+        fading = [math.exp(-motion.path_m / error.length_m) for error in errors]
+        kept = [1.0] * (len(state.mean) - POSE - len(errors)) + fading
+        x, y, heading, *rest = state.mean
+        step = self._move(state.mean, motion)
+        top = self._top(step, state.covariance)
+        across = [[p * k for p, k in zip(row[POSE:], kept)] for row in top]
+        below = [[p * (own * k) for p, k in zip(row[POSE:], kept)] for own, row in zip(kept, state.covariance[POSE:])]
+        for i, (own, error) in enumerate(zip(fading, errors), start=len(kept) - len(errors)):
+            below[i][i] += (1.0 - own * own) * error.variance
+        corner = self._corner(top, step).matrix
+        rows = [[*own, *row] for own, row in zip(corner, across)]
+        rows += [[*column, *row] for column, row in zip(zip(*across), below)]
+        mean = [x + step.dx, y + step.dy, wrap_angle(heading + step.turn), *(m * k for m, k in zip(rest, kept))]
+        return State(mean, rows, state.path_m + motion.path_m, state.anchors)
 
-    def _updated(
-        self, prior_mean: Floats, prior_covariance: Floats, path_m: float, scan: Radio
-    ) -> tuple[State, tuple[Fate, ...]]:
-        mean, covariance = prior_mean.copy(), prior_covariance
-        fates = []
-        for reading in radio_readings(self._world, scan):
-            innovation, row, variance = self._linearise(reading, prior_mean, path_m)
-            spread = float(row @ prior_covariance @ row) + variance
+    def _updated(self, before: State, scan: Radio) -> tuple[State, tuple[Fate, ...]]:
+        readings = radio_readings(self._world, scan)
+        before = self._with_anchors(before, readings)
+        places = {anchor: i for i, anchor in enumerate(before.anchors, start=len(before.mean) - len(before.anchors))}
+        mean, gains, fates = before.mean, list[Row](), []
+        for reading in readings:
+            innovation, jacobian, variance = self._linearise(reading, before, places)
+            shared = _shared(before.covariance, jacobian)
+            spread = variance + sum(by * shared[i] for i, by in jacobian.items())
             nis = innovation * innovation / spread
             used = nis <= self._gate
             if used:
-                gain_numerator = covariance @ row
-                total = float(row @ gain_numerator) + variance
-                remaining = innovation - float(row @ (mean - prior_mean))
-                mean = mean + gain_numerator * (remaining / total)
-                covariance = covariance - np.outer(gain_numerator, gain_numerator / total)
+                remaining = innovation - sum(by * (mean[i] - before.mean[i]) for i, by in jacobian.items())
+                gain, step = _gain(shared, jacobian, gains, variance, remaining)
+                gains.append(gain)
+                mean = [m + step * g for m, g in zip(mean, gain)]
             verdict = (Decision.USED, Reason.OK, 1.0) if used else (Decision.REJECTED, Reason.GATE, 0.0)
             who = (scan.time_ns, scan.sensor, scan.seq, reading.anchor.id)
             fates.append(Fate(*who, *verdict, innovation, spread, nis))
-        return _state(mean, covariance, 0.0), tuple(fates)
+        x, y, heading, *rest = mean
+        rows = _less(before.covariance, gains)
+        return State([x, y, wrap_angle(heading), *rest], rows, 0.0, before.anchors), tuple(fates)
 
-    def _linearise(self, reading: RadioReading, mean: Floats, path_m: float) -> tuple[float, Floats, float]:
-        """Innovation, Jacobian row and variance of one reading at the belief ``mean``, ``path_m`` after the last."""
-        x, y, heading = mean[POSE].tolist()
+    def _with_anchors(self, state: State, readings: Sequence[RadioReading]) -> State:
+        """The state, with the common errors of anchors that it has received nothing of before."""
+        received = [(reading.anchor.id, type(reading.model)) for reading in readings]
+        new = tuple(one for one in received if one in self._anchor_errors and one not in state.anchors)
+        if not new:
+            return state
+        mean, rows = _with_states(state.mean, state.covariance, [self._anchor_errors[one].variance for one in new])
+        return State(mean, rows, state.path_m, state.anchors + new)
+
+    def _linearise(
+        self, reading: RadioReading, state: State, places: dict[tuple[str, type], int]
+    ) -> tuple[float, dict[int, float], float]:
+        """Innovation, Jacobian (by the states that are in it) and variance of one reading at the belief before it."""
+        x, y, heading, *_ = state.mean
         expected = reading.expect(x, y, heading, self._world.robot.antenna_m)
-        row = np.zeros(len(mean))
-        row[POSE] = expected.by_x, expected.by_y, expected.by_heading
+        jacobian = {0: expected.by_x, 1: expected.by_y}
+        if expected.by_heading != 0.0:
+            jacobian[2] = expected.by_heading
         innovation, variance, kind = reading.value - expected.value, reading.variance, type(reading.model)
         if (gain := self._gain_index.get(kind)) is not None:
-            row[gain] = expected.by_gain
-            innovation -= expected.by_gain * float(mean[gain])
-        if (bias := self._bias_index.get((reading.anchor.id, kind))) is None:
-            times = correlated_count_of(reading.model, path_m, self._max_correlated, self._lengths_m[kind])
-            return innovation, row, variance + times * reading.model.bias_std**2
-        row[bias] = 1.0
-        return innovation - float(mean[bias]), row, variance
+            jacobian[gain] = expected.by_gain
+            innovation -= expected.by_gain * state.mean[gain]
+        if (place := places.get((reading.anchor.id, kind))) is None:
+            times = correlated_count_of(reading.model, state.path_m, self._max_correlated, self._lengths_m[kind])
+            return innovation, jacobian, variance + times * reading.model.bias_std**2
+        jacobian[place] = 1.0
+        return innovation - state.mean[place], jacobian, variance
 
 
-def _state(mean: Floats, covariance: Floats, path_m: float) -> State:
-    """The state, its heading wrapped and its covariance symmetric to the last bit."""
-    mean[HEADING] = wrap_angle(float(mean[HEADING]))
-    return State(mean, 0.5 * (covariance + covariance.T), path_m)
+def _with_states(mean: Row, rows: list[Row], variances: Sequence[float]) -> tuple[Row, list[Row]]:
+    """Further states of mean zero, each independent of all others."""
+    count, more = len(mean), len(variances)
+    wider = [[*row, *[0.0] * more] for row in rows]
+    for i, variance in enumerate(variances):
+        wider.append([0.0] * (count + more))
+        wider[-1][count + i] = variance
+    return [*mean, *[0.0] * more], wider
+
+
+def _shared(rows: Sequence[Row], jacobian: dict[int, float]) -> Row:
+    """P Hᵀ, the covariance of the states with what one reading shows."""
+    (i, by), *others = jacobian.items()
+    shared = [by * p for p in rows[i]]
+    for i, by in others:
+        shared = [s + by * p for s, p in zip(shared, rows[i])]
+    return shared
+
+
+def _gain(
+    shared: Row, jacobian: dict[int, float], gains: Sequence[Row], variance: float, innovation: float
+) -> tuple[Row, float]:
+    """The gain of one scalar reading over the root of its innovation's variance, and the innovation over that root.
+
+    P after the readings before is P - Σ g gᵀ of their ``gains``, so P Hᵀ is ``shared`` - Σ g (H g): the covariance is
+    written once a scan only, and stays symmetric to the last bit (Potter's form: Bierman 1977, section II.3).
+    """
+    for gain in gains:
+        part = sum(by * gain[i] for i, by in jacobian.items())
+        shared = [s - part * g for s, g in zip(shared, gain)]
+    root = 1.0 / math.sqrt(variance + sum(by * shared[i] for i, by in jacobian.items()))
+    return [s * root for s in shared], innovation * root
+
+
+def _less(rows: list[Row], gains: Sequence[Row]) -> list[Row]:
+    """P - Σ g gᵀ, three gains at a time."""
+    for first in range(0, len(gains), 3):
+        one, two, three = (*gains[first : first + 3], *[[0.0] * len(rows)] * 2)[:3]
+        rows = [
+            [p - a * x - b * y - c * z for p, x, y, z in zip(row, one, two, three)]
+            for row, a, b, c in zip(rows, one, two, three)
+        ]
+    return rows

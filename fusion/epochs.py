@@ -9,14 +9,13 @@ longer hold. That rule looks at the data alone, so the same measurements always 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from fusion.fates import unusable
-from fusion.motion import Increment
-from fusion.odometry import Odometer, OdometerState
-from fusion.screen import screen
-from fusion.values import Fate, Gyro, Measurement, Odometry, Radio, Ranges, Reason, WifiScan
+from fusion.motion import Increment, Integral
+from fusion.odometry import Odometer
+from fusion.screen import motion_flaw, screen_radio
+from fusion.values import Fate, Gyro, Measurement, Radio, Reason
 from fusion.world import World
 
 
@@ -31,12 +30,6 @@ class Longest(NamedTuple):
     turn_rad: float = math.tau
     duration_s: float = 30.0
 
-    def reached(self, motion: Increment) -> bool:
-        """Whether ``motion`` is to be closed."""
-        return (
-            motion.path_m >= self.path_m or abs(motion.heading) >= self.turn_rad or motion.duration_s >= self.duration_s
-        )
-
 
 LONGEST = Longest()
 
@@ -49,63 +42,76 @@ class Epoch(NamedTuple):
     scan: Radio | None
 
 
-class FrontEndState(NamedTuple):
-    """Memory of the front end: the odometer, and the motion since the last epoch."""
-
-    odometer: OdometerState
-    motion: Increment
-
-
 class FrontEnd:
-    """Screening, odometry and pre-integration for one world. Holds the world only; the state is a value."""
+    """Screening, odometry and pre-integration for one world, from ``start_ns`` on: no motion before it counts."""
 
-    def __init__(self, world: World, longest: Longest = LONGEST) -> None:
+    __slots__ = ("_closed", "_integral", "_longest", "_odometer", "_takes_gyro", "_world")
+
+    def __init__(self, world: World, start_ns: int, longest: Longest = LONGEST) -> None:
         self._world = world
         self._longest = longest
-        self._noise = world.robot.noise
-        self._odometer = Odometer(world.robot)
         self._takes_gyro = world.robot.turn_source == "gyro"
+        self._odometer = Odometer(world.robot, start_ns)
+        self._integral = Integral(world.robot.noise, Increment(time_ns=start_ns))
+        self._closed: tuple[Epoch, ...] = ()
 
-    def start(self, time_ns: int) -> FrontEndState:
-        """No motion before ``time_ns`` counts."""
-        return FrontEndState(self._odometer.start(time_ns), Increment(time_ns=time_ns))
+    def copy(self) -> FrontEnd:
+        """Another one in the same state, which goes on by itself."""
+        twin = object.__new__(FrontEnd)
+        twin._world, twin._longest, twin._takes_gyro = self._world, self._longest, self._takes_gyro
+        twin._odometer, twin._integral, twin._closed = self._odometer.copy(), self._integral.copy(), ()
+        return twin
 
-    def advance(
-        self, state: FrontEndState, measurement: Measurement
-    ) -> tuple[FrontEndState, tuple[Epoch, ...], tuple[Fate, ...]]:
-        """The state after a measurement, the epochs that it closed, and the Fates of what could not be used.
+    @property
+    def motion(self) -> Increment:
+        """The motion since the last epoch."""
+        return self._integral.increment
 
-        Raises `MeasurementError` for motion of more or fewer wheels than the robot has.
+    def advance(self, measurement: Measurement) -> tuple[tuple[Epoch, ...], tuple[Fate, ...]]:
+        """The epochs that a measurement closes, and the Fates of what could not be used.
+
+        Raises `MeasurementError` for motion of more or fewer wheels than the robot has; nothing has changed then.
         """
-        kept, fates = screen(self._world, measurement)
-        if kept is None:
-            return state, (), fates
-        if isinstance(kept, WifiScan | Ranges):
-            odometer, steps = self._odometer.hold(state.odometer, kept.time_ns)
-            motion, closed = self._integrated(state.motion, steps)
-            epoch = Epoch(kept.time_ns, motion, kept)
-            return FrontEndState(odometer, Increment(time_ns=kept.time_ns)), (*closed, epoch), fates
-        if isinstance(kept, Gyro) and not self._takes_gyro:
-            return state, (), unusable(kept, Reason.KIND_NOT_CONSUMED)
-        odometer, steps = self._odometer.advance(state.odometer, kept)
-        motion, closed = self._integrated(state.motion, steps)
-        return FrontEndState(odometer, motion), closed, fates
+        if isinstance(measurement, Radio):
+            return self._scanned(measurement)
+        if (reason := motion_flaw(measurement)) is not None:
+            return (), unusable(measurement, reason)
+        if not self._takes_gyro and isinstance(measurement, Gyro):
+            return (), unusable(measurement, Reason.KIND_NOT_CONSUMED)
+        self._odometer.advance(measurement, self._extend)
+        return self._taken() if self._closed else (), ()
 
-    def held(self, state: FrontEndState, time_ns: int) -> Increment:
+    def held(self, time_ns: int) -> Increment:
         """The motion since the last epoch, held on the last twist up to ``time_ns``. It closes no epoch, so asking
         changes nothing.
         """
-        motion = state.motion
-        for step in self._odometer.hold(state.odometer, time_ns)[1]:
-            motion = motion.extend(step, self._noise)
-        return motion
+        integral = self._integral.copy()
+        self._odometer.copy().hold(time_ns, integral.extend)
+        return integral.increment
 
-    def _integrated(self, motion: Increment, steps: Sequence[Odometry]) -> tuple[Increment, tuple[Epoch, ...]]:
-        """``motion`` followed by the steps, and the epochs closed on the way."""
-        closed: tuple[Epoch, ...] = ()
-        for step in steps:
-            motion = motion.extend(step, self._noise)
-            if self._longest.reached(motion):
-                closed = (*closed, Epoch(step.time_ns, motion, None))
-                motion = Increment(time_ns=step.time_ns)
-        return motion, closed
+    def _scanned(self, scan: Radio) -> tuple[tuple[Epoch, ...], tuple[Fate, ...]]:
+        kept, fates = screen_radio(self._world, scan)
+        if kept is None:
+            return (), fates
+        self._odometer.hold(kept.time_ns, self._extend)
+        self._close(kept.time_ns, kept)
+        return self._taken(), fates
+
+    def _extend(self, from_ns: int, time_ns: int, distance_m: float, turn_rad: float, measured: bool) -> None:
+        """One step more, and the end of the epoch where it has grown too long."""
+        motion, longest = self._integral, self._longest
+        motion.extend(from_ns, time_ns, distance_m, turn_rad, measured)
+        if (
+            motion.path_m >= longest.path_m
+            or abs(motion.heading) >= longest.turn_rad
+            or motion.duration_s >= longest.duration_s
+        ):
+            self._close(time_ns, None)
+
+    def _close(self, time_ns: int, scan: Radio | None) -> None:
+        self._closed = (*self._closed, Epoch(time_ns, self._integral.increment, scan))
+        self._integral.restart(Increment(time_ns=time_ns))
+
+    def _taken(self) -> tuple[Epoch, ...]:
+        closed, self._closed = self._closed, ()
+        return closed

@@ -29,7 +29,6 @@ class Update:
         measurement: Measurement,
         estimate: Estimate | Callable[[], Estimate],
         fates: tuple[Fate, ...],
-        *,
         epochs: tuple[Epoch, ...] = (),
         revised: bool = False,
     ) -> None:
@@ -55,6 +54,10 @@ def asked(estimator: Estimator[Any], state: Any, motion: Increment, time_ns: int
         raise
     except Exception as error:
         raise _failed(estimator, f"when asked for its estimate at {time_ns} ns", error) from error
+
+
+def _asked_at(estimator: Estimator[Any], state: Any, moment: Moment) -> Estimate:  # noqa: ANN401
+    return asked(estimator, state, moment.motion, moment.time_ns)
 
 
 def _started(estimator: Estimator[Any], prior: Prior, seed: int) -> Any:  # noqa: ANN401 - a state is opaque
@@ -88,7 +91,7 @@ class Fold:
     def take(self, moment: Moment) -> Update:
         """Step through the epochs of a moment. Raises `PluginError` where the estimator fails."""
         states = self._states
-        for _ in range(self._settled + len(states) - 1 - moment.first):
+        while self._settled + len(states) - 1 > moment.first:
             states.pop()
         fates = moment.fates
         for epoch in moment.epochs:
@@ -98,8 +101,8 @@ class Fold:
         while self._settled < moment.settled:
             states.popleft()
             self._settled += 1
-        ask = partial(asked, self._estimator, states[-1], moment.motion, moment.time_ns)
-        return Update(moment.measurement, ask, fates, epochs=moment.epochs, revised=moment.revised)
+        ask = partial(_asked_at, self._estimator, states[-1], moment)
+        return Update(moment.measurement, ask, fates, moment.epochs, moment.revised)
 
     def estimate(self, motion: Increment, time_ns: int) -> Estimate:
         """The belief at ``time_ns``, after the ``motion`` since the last epoch."""

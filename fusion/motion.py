@@ -18,34 +18,10 @@ from typing import NamedTuple, TypeVar
 from fusion.arrays import Floats
 from fusion.geometry import Covariance, Pose, wrap_angle
 from fusion.robot import OdometryNoise
-from fusion.values import Odometry, seconds
+from fusion.values import NANOSECONDS, Odometry
 
 Number = TypeVar("Number", float, Floats)
 NO_NOISE = Covariance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-class StepNoise(NamedTuple):
-    """Variances of one step in the robot's frame: forward [m^2], sideways [m^2], turn [rad^2]."""
-
-    forward: float
-    side: float
-    turn: float
-
-
-def step_noise(noise: OdometryNoise, odometry: Odometry) -> StepNoise:
-    """White noise of one increment: proportional to path, turn and time, so it does not depend on the message rate."""
-    duration_s = seconds(odometry.time_ns - odometry.from_ns)
-    if not odometry.measured:
-        drift = noise.drift_std_per_sqrt_s**2 * duration_s
-        return StepNoise(drift, drift, noise.turn_drift_std_per_sqrt_s**2 * duration_s)
-    path_m, turn_rad = abs(odometry.distance_m), abs(odometry.turn_rad)
-    return StepNoise(
-        noise.distance_std_per_sqrt_m**2 * path_m + noise.distance_std_per_sqrt_s**2 * duration_s,
-        noise.side_std_per_sqrt_m**2 * path_m,
-        noise.turn_std_per_sqrt_rad**2 * turn_rad
-        + noise.turn_std_per_sqrt_m**2 * path_m
-        + noise.turn_std_per_sqrt_s**2 * duration_s,
-    )
 
 
 class Increment(NamedTuple):
@@ -71,39 +47,10 @@ class Increment(NamedTuple):
     time_ns: int = 0
 
     def extend(self, odometry: Odometry, noise: OdometryNoise) -> Increment:
-        """This motion followed by one odometry step (mid-point rule: Thrun et al. 2005, section 5.4)."""
-        distance, turn = odometry.distance_m, odometry.turn_rad
-        forward, side, turned = step_noise(noise, odometry)
-        duration_s = seconds(odometry.time_ns - odometry.from_ns)
-        middle = self.heading + 0.5 * turn
-        c, s = math.cos(middle), math.sin(middle)
-        dx, dy = distance * c, distance * s
-        # F moves the pose's own error, G = [c -s -dy/2; s c dx/2; 0 0 1] brings in (forward, side, turn).
-        xx, xy, own_xh, yy, own_yh, hh = self.covariance
-        xh, yh = own_xh - dy * hh, own_yh + dx * hh
-        gx, gy = -0.5 * dy, 0.5 * dx
-        bias_lever = self.duration_s + 0.5 * duration_s
-        return Increment(
-            self.x + dx,
-            self.y + dy,
-            self.heading + turn,
-            Covariance(
-                xx - dy * (own_xh + xh) + c * c * forward + s * s * side + gx * gx * turned,
-                xy + dx * own_xh - dy * yh + c * s * (forward - side) + gx * gy * turned,
-                xh + gx * turned,
-                yy + dx * (own_yh + yh) + s * s * forward + c * c * side + gy * gy * turned,
-                yh + gy * turned,
-                hh + turned,
-            ),
-            self.x_by_bias - dy * bias_lever,
-            self.y_by_bias + dx * bias_lever,
-            self.x_by_scale - dy * middle,
-            self.y_by_scale + dx * middle,
-            self.duration_s + duration_s,
-            self.path_m + abs(distance),
-            self.unmeasured_s if odometry.measured else self.unmeasured_s + duration_s,
-            odometry.time_ns,
-        )
+        """This motion followed by one odometry step."""
+        integral = Integral(noise, self)
+        integral.extend(odometry.from_ns, odometry.time_ns, odometry.distance_m, odometry.turn_rad, odometry.measured)
+        return integral.increment
 
     def then(self, later: Increment) -> Increment:
         """This motion followed by a ``later`` one that starts where it ends."""
@@ -140,6 +87,106 @@ class Increment(NamedTuple):
     def pose(self) -> Pose:
         """The motion without its uncertainty."""
         return Pose(self.x, self.y, wrap_angle(self.heading))
+
+
+class Integral:
+    """The running integral of odometry steps: an `Increment` in the making. It changes at the rate of the odometry, so
+    it is one object that is written to.
+    """
+
+    __slots__ = (*Increment._fields, *(f"_{name}" for name in Covariance._fields), "_drift_rates", "_rates")
+
+    def __init__(self, noise: OdometryNoise, begun: Increment) -> None:
+        # White noise of the odometry as variances per metre, radian and second: it does not depend on the message rate.
+        self._rates = (
+            noise.distance_std_per_sqrt_m**2,
+            noise.distance_std_per_sqrt_s**2,
+            noise.side_std_per_sqrt_m**2,
+            noise.turn_std_per_sqrt_rad**2,
+            noise.turn_std_per_sqrt_m**2,
+            noise.turn_std_per_sqrt_s**2,
+        )
+        self._drift_rates = noise.drift_std_per_sqrt_s**2, noise.turn_drift_std_per_sqrt_s**2
+        self.restart(begun)
+
+    def restart(self, begun: Increment) -> None:
+        """Go on from ``begun``."""
+        (
+            self.x,
+            self.y,
+            self.heading,
+            (self._xx, self._xy, self._xh, self._yy, self._yh, self._hh),
+            self.x_by_bias,
+            self.y_by_bias,
+            self.x_by_scale,
+            self.y_by_scale,
+            self.duration_s,
+            self.path_m,
+            self.unmeasured_s,
+            self.time_ns,
+        ) = begun
+
+    def copy(self) -> Integral:
+        """Another one in the same state."""
+        twin = object.__new__(Integral)
+        twin._rates, twin._drift_rates = self._rates, self._drift_rates
+        twin.restart(self.increment)
+        return twin
+
+    @property
+    def increment(self) -> Increment:
+        """The motion up to now."""
+        return Increment(
+            self.x,
+            self.y,
+            self.heading,
+            Covariance(self._xx, self._xy, self._xh, self._yy, self._yh, self._hh),
+            self.x_by_bias,
+            self.y_by_bias,
+            self.x_by_scale,
+            self.y_by_scale,
+            self.duration_s,
+            self.path_m,
+            self.unmeasured_s,
+            self.time_ns,
+        )
+
+    def extend(self, from_ns: int, time_ns: int, distance_m: float, turn_rad: float, measured: bool) -> None:
+        """One step of odometry more, as `fusion.odometry.Step` (mid-point rule: Thrun et al. 2005, section 5.4)."""
+        duration_s = (time_ns - from_ns) / NANOSECONDS
+        path_m = abs(distance_m)
+        if measured:
+            per_m, per_s, side_per_m, turn_per_rad, turn_per_m, turn_per_s = self._rates
+            forward, side = per_m * path_m + per_s * duration_s, side_per_m * path_m
+            turned = turn_per_rad * abs(turn_rad) + turn_per_m * path_m + turn_per_s * duration_s
+        else:
+            forward = side = self._drift_rates[0] * duration_s
+            turned = self._drift_rates[1] * duration_s
+            self.unmeasured_s += duration_s
+        middle = self.heading + 0.5 * turn_rad
+        c, s = math.cos(middle), math.sin(middle)
+        dx, dy = distance_m * c, distance_m * s
+        # F moves the pose's own error, G = [c -s -dy/2; s c dx/2; 0 0 1] brings in (forward, side, turn).
+        own_xh, own_yh, hh = self._xh, self._yh, self._hh
+        xh, yh = own_xh - dy * hh, own_yh + dx * hh
+        gx, gy = -0.5 * dy, 0.5 * dx
+        self._xx = self._xx - dy * (own_xh + xh) + c * c * forward + s * s * side + gx * gx * turned
+        self._xy = self._xy + dx * own_xh - dy * yh + c * s * (forward - side) + gx * gy * turned
+        self._xh = xh + gx * turned
+        self._yy = self._yy + dx * (own_yh + yh) + s * s * forward + c * c * side + gy * gy * turned
+        self._yh = yh + gy * turned
+        self._hh = hh + turned
+        bias_lever = self.duration_s + 0.5 * duration_s
+        self.x += dx
+        self.y += dy
+        self.heading += turn_rad
+        self.x_by_bias -= dy * bias_lever
+        self.y_by_bias += dx * bias_lever
+        self.x_by_scale -= dy * middle
+        self.y_by_scale += dx * middle
+        self.duration_s += duration_s
+        self.path_m += path_m
+        self.time_ns = time_ns
 
 
 class Move(NamedTuple):

@@ -8,15 +8,14 @@ increment arrives, so motion counts exactly once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from fusion.errors import MeasurementError
 from fusion.geometry import wrap_angle
 from fusion.robot import WHEELS, Robot
-from fusion.values import Gyro, Motion, MotorCommand, Odometry, WheelTicks, nanoseconds, seconds
+from fusion.values import NANOSECONDS, Gyro, Motion, MotorCommand, Odometry, WheelTicks, nanoseconds, seconds
 
 MAX_HOLD_NS = nanoseconds(0.5)
 """Longest time a twist is held without new odometry, unless odometry itself comes more slowly."""
@@ -69,19 +68,6 @@ def wheel_increment(robot: Robot, rolled_m: Sequence[float]) -> tuple[float, flo
     return 0.5 * (left + right), (right - left) / robot.track_width_m
 
 
-def since(start_ns: int, odometry: Odometry) -> Odometry:
-    """The part of an increment from ``start_ns`` on, its twist taken as steady.
-
-    >>> since(60, Odometry(100, "wheels", 0, from_ns=0, distance_m=0.5, turn_rad=1.0)).distance_m
-    0.2
-    """
-    if odometry.from_ns >= start_ns:
-        return odometry
-    share = (odometry.time_ns - start_ns) / (odometry.time_ns - odometry.from_ns)
-    distance_m, turn_rad = share * odometry.distance_m, share * odometry.turn_rad
-    return replace(odometry, from_ns=start_ns, distance_m=distance_m, turn_rad=turn_rad)
-
-
 class _GyroAngle(NamedTuple):
     """The gyro's integral: angle [rad] at a time, and the rate then [rad/s]."""
 
@@ -93,43 +79,11 @@ class _GyroAngle(NamedTuple):
         return self.angle + self.rate * seconds(time_ns - self.time_ns)
 
 
-class OdometerState(NamedTuple):
-    """Memory of the odometer. ``start_ns``: motion before it is none of this run's; ``covered_ns``: motion is
-    accounted for up to here.
-    """
+class Step(Protocol):
+    """Takes one step of motion over (``from_ns``, ``time_ns``]: path length [m] and turn [rad]."""
 
-    start_ns: int
-    covered_ns: int
-    last_ns: int
-    span_ns: int = 0
-    speed_m_s: float = 0.0
-    turn_rate_rad_s: float = 0.0
-    held_distance_m: float = 0.0
-    held_turn_rad: float = 0.0
-    counts: tuple[int, ...] | None = None
-    forward: tuple[int, ...] | None = None
-    moving: bool = False
-    gyro: _GyroAngle | None = None
-    gyro_angle_at_last: float = 0.0
-
-
-class _Twist(NamedTuple):
-    """Mean speed [m/s] and turn rate [rad/s] of an increment, and the time it is a mean over."""
-
-    span_ns: int
-    speed_m_s: float
-    turn_rate_rad_s: float
-
-
-def _twist(state: OdometerState, own: Odometry, turn_rad: float) -> _Twist:
-    """The twist of an increment: its mean, or over `TWIST_NS` where it is too short to give one."""
-    span_ns = own.time_ns - own.from_ns
-    if span_ns >= SHORT_NS or state.span_ns == 0:
-        span_s = max(seconds(span_ns), 1e-9)
-        return _Twist(span_ns, own.distance_m / span_s, turn_rad / span_s)
-    before, span_s = 1.0 - span_ns / TWIST_NS, seconds(TWIST_NS)
-    speed_m_s = before * state.speed_m_s + own.distance_m / span_s
-    return _Twist(TWIST_NS, speed_m_s, before * state.turn_rate_rad_s + turn_rad / span_s)
+    def __call__(self, from_ns: int, time_ns: int, distance_m: float, turn_rad: float, measured: bool) -> None:
+        """``measured`` False: nothing measured the motion of that time, and zero stands for "not known"."""
 
 
 def _forward(before: tuple[int, ...] | None, speeds_m_s: Sequence[float]) -> tuple[int, ...]:
@@ -141,29 +95,72 @@ def _forward(before: tuple[int, ...] | None, speeds_m_s: Sequence[float]) -> tup
 
 
 class Odometer:
-    """Turns one robot's motion measurements into `Odometry`. Holds the robot only; the state is a value."""
+    """Turns one robot's motion measurements into steps of motion. ``start_ns``: motion before it is none of this run's,
+    and no increment that ends by then may be handed to `advance`. It changes at the rate of the wheels, so it is one
+    object that is written to.
+    """
 
-    def __init__(self, robot: Robot) -> None:
+    __slots__ = (
+        "_counts",
+        "_covered_ns",
+        "_distance",
+        "_forward",
+        "_gyro",
+        "_gyro_angle_at_last",
+        "_held_distance_m",
+        "_held_turn_rad",
+        "_last_ns",
+        "_moving",
+        "_span_ns",
+        "_speed_m_s",
+        "_start_ns",
+        "_takes_gyro",
+        "_turn_rate_rad_s",
+        "robot",
+    )
+
+    def __init__(self, robot: Robot, start_ns: int) -> None:
         self.robot = robot
+        self._takes_gyro = robot.turn_source == "gyro"
         self._distance = LinearDistance(robot.distance_scale, robot.distance_offset_m)
+        self._start_ns = self._covered_ns = self._last_ns = start_ns  # motion is accounted for up to ``covered``
+        self._span_ns = 0
+        self._speed_m_s = self._turn_rate_rad_s = 0.0
+        self._held_distance_m = self._held_turn_rad = 0.0
+        self._counts: tuple[int, ...] | None = None
+        self._forward: tuple[int, ...] | None = None
+        self._moving = False
+        self._gyro: _GyroAngle | None = None
+        self._gyro_angle_at_last = 0.0
 
-    def start(self, time_ns: int) -> OdometerState:
-        """Motion is accounted for from ``time_ns`` on; no increment that ends by then may be handed to `advance`."""
-        return OdometerState(start_ns=time_ns, covered_ns=time_ns, last_ns=time_ns)
+    def copy(self) -> Odometer:
+        """Another one in the same state."""
+        twin = object.__new__(Odometer)
+        for name in Odometer.__slots__:
+            setattr(twin, name, getattr(self, name))
+        return twin
 
-    def advance(self, state: OdometerState, measurement: Motion) -> tuple[OdometerState, tuple[Odometry, ...]]:
-        """The state after a measurement of motion, and the increments that it brought, in order.
+    def advance(self, measurement: Motion, step: Step) -> None:
+        """Hand the motion that a measurement brought to ``step``.
 
         Raises `MeasurementError` when it is of more or fewer wheels than the robot has.
         """
         if isinstance(measurement, Odometry):
-            return self._real(state, measurement)
-        if isinstance(measurement, WheelTicks):
-            return self._ticks(state, measurement)
-        if isinstance(measurement, Gyro):
-            return self._gyro(state, measurement), ()
-        self._require_wheels(len(measurement.wheel_speeds_m_s), measurement)
-        return state._replace(forward=_forward(state.forward, measurement.wheel_speeds_m_s)), ()
+            self._drive(
+                measurement.from_ns,
+                measurement.time_ns,
+                measurement.distance_m,
+                measurement.turn_rad,
+                measurement.measured,
+                step,
+            )
+        elif isinstance(measurement, WheelTicks):
+            self._count(measurement, step)
+        elif isinstance(measurement, Gyro):
+            self._integrate(measurement)
+        else:
+            self._require_wheels(len(measurement.wheel_speeds_m_s), measurement)
+            self._forward = _forward(self._forward, measurement.wheel_speeds_m_s)
 
     def _require_wheels(self, count: int, measurement: WheelTicks | MotorCommand) -> None:
         wheels = len(WHEELS[self.robot.drive])
@@ -173,80 +170,82 @@ class Odometer:
                 f"wheels, the world's {self.robot.drive} drive has {wheels}; correct robot.drive, or the driver"
             )
 
-    def hold(self, state: OdometerState, time_ns: int) -> tuple[OdometerState, tuple[Odometry, ...]]:
-        """Motion up to ``time_ns`` on the last twist known; past the longest hold, unmeasured motion."""
-        if time_ns <= state.covered_ns:
-            return state, ()
-        limit_ns = state.last_ns + max(MAX_HOLD_NS, state.span_ns * 3 // 2) if state.span_ns else state.covered_ns
-        motion: list[Odometry] = []
+    def hold(self, time_ns: int, step: Step) -> None:
+        """Hand motion up to ``time_ns`` to ``step``: by the last twist, and past the longest hold as unmeasured."""
+        if time_ns <= self._covered_ns:
+            return
+        limit_ns = self._last_ns + max(MAX_HOLD_NS, self._span_ns * 3 // 2) if self._span_ns else self._covered_ns
         for until_ns, measured in ((min(time_ns, limit_ns), True), (time_ns, False)):
-            if until_ns > state.covered_ns:
-                duration_s = seconds(until_ns - state.covered_ns) if measured else 0.0
-                distance, turn = state.speed_m_s * duration_s, state.turn_rate_rad_s * duration_s
-                motion.append(Odometry(until_ns, "held", 0, state.covered_ns, distance, turn, measured))
-                state = state._replace(
-                    covered_ns=until_ns,
-                    held_distance_m=state.held_distance_m + distance,
-                    held_turn_rad=state.held_turn_rad + turn,
-                )
-        return state, tuple(motion)
+            if until_ns > self._covered_ns:
+                duration_s = seconds(until_ns - self._covered_ns) if measured else 0.0
+                distance, turn = self._speed_m_s * duration_s, self._turn_rate_rad_s * duration_s
+                step(self._covered_ns, until_ns, distance, turn, measured)
+                self._covered_ns = until_ns
+                self._held_distance_m += distance
+                self._held_turn_rad += turn
 
-    def _real(self, state: OdometerState, odometry: Odometry) -> tuple[OdometerState, tuple[Odometry, ...]]:
+    def _drive(
+        self, from_ns: int, time_ns: int, distance_m: float, turn_rad: float, measured: bool, step: Step
+    ) -> None:
         """A measured increment: what was driven before the start, or held already, is taken off."""
-        own = since(state.start_ns, odometry)
-        turn = own.turn_rad
-        angle = state.gyro_angle_at_last
-        if self.robot.turn_source == "gyro" and state.gyro is not None:
-            angle = state.gyro.at(odometry.time_ns)
-            if odometry.time_ns - state.gyro.time_ns <= MAX_GYRO_AGE_NS:
-                turn = angle - state.gyro_angle_at_last
-        remaining = Odometry(
-            odometry.time_ns,
-            odometry.sensor,
-            odometry.seq,
-            min(state.covered_ns, odometry.time_ns),
-            own.distance_m - state.held_distance_m,
-            turn - state.held_turn_rad,
-            odometry.measured,
-        )
-        twist = _twist(state, own, turn)
-        return state._replace(
-            covered_ns=max(state.covered_ns, odometry.time_ns),
-            last_ns=odometry.time_ns,
-            span_ns=max(twist.span_ns, odometry.time_ns - odometry.from_ns),
-            speed_m_s=twist.speed_m_s,
-            turn_rate_rad_s=twist.turn_rate_rad_s,
-            held_distance_m=0.0,
-            held_turn_rad=0.0,
-            gyro_angle_at_last=angle,
-        ), (remaining,)
+        span_ns = time_ns - from_ns
+        if from_ns < self._start_ns:  # its twist is taken as steady
+            share = (time_ns - self._start_ns) / span_ns
+            distance_m, turn_rad = share * distance_m, share * turn_rad
+            from_ns = self._start_ns
+        if self._takes_gyro and self._gyro is not None:
+            angle = self._gyro.at(time_ns)
+            if time_ns - self._gyro.time_ns <= MAX_GYRO_AGE_NS:
+                turn_rad = angle - self._gyro_angle_at_last
+            self._gyro_angle_at_last = angle
+        self._twist(time_ns - from_ns, distance_m, turn_rad)
+        self._span_ns = max(self._span_ns, span_ns)
+        begun_ns, held_m, held_rad = self._covered_ns, self._held_distance_m, self._held_turn_rad
+        self._held_distance_m = self._held_turn_rad = 0.0
+        self._last_ns = time_ns
+        if begun_ns < time_ns:
+            self._covered_ns = time_ns
+        else:
+            begun_ns = time_ns
+        step(begun_ns, time_ns, distance_m - held_m, turn_rad - held_rad, measured)
 
-    def _ticks(self, state: OdometerState, ticks: WheelTicks) -> tuple[OdometerState, tuple[Odometry, ...]]:
+    def _twist(self, span_ns: int, distance_m: float, turn_rad: float) -> None:
+        """Mean speed and turn rate of an increment, or over `TWIST_NS` where it is too short to give them."""
+        if span_ns >= SHORT_NS or self._span_ns == 0:
+            self._span_ns, span_s = span_ns, (span_ns or 1) / NANOSECONDS
+            self._speed_m_s, self._turn_rate_rad_s = distance_m / span_s, turn_rad / span_s
+            return
+        before, span_s = 1.0 - span_ns / TWIST_NS, seconds(TWIST_NS)
+        self._span_ns = TWIST_NS
+        self._speed_m_s = before * self._speed_m_s + distance_m / span_s
+        self._turn_rate_rad_s = before * self._turn_rate_rad_s + turn_rad / span_s
+
+    def _count(self, ticks: WheelTicks, step: Step) -> None:
         self._require_wheels(len(ticks.counts), ticks)
-        before, counted = state.counts, state._replace(counts=ticks.counts)
+        before, self._counts = self._counts, ticks.counts
         if before is None:
-            angle = state.gyro.at(ticks.time_ns) if state.gyro else 0.0
-            return counted._replace(last_ns=ticks.time_ns, gyro_angle_at_last=angle), ()
-        signs = state.forward if self.robot.encoder == "single_channel" and state.forward else (1,) * len(before)
+            self._last_ns = ticks.time_ns
+            self._gyro_angle_at_last = self._gyro.at(ticks.time_ns) if self._gyro else 0.0
+            return
+        signs = self._forward if self.robot.encoder == "single_channel" and self._forward else (1,) * len(before)
         per_tick = self.robot.distance_per_tick_m
         rolled = [sign * per_tick * (now - then) for sign, now, then in zip(signs, ticks.counts, before, strict=True)]
-        span_ns = ticks.time_ns - state.last_ns
+        span_ns = ticks.time_ns - self._last_ns
         if max(map(abs, rolled)) > MAX_WHEEL_SPEED_M_S * max(seconds(span_ns), 0.1):
-            return counted, ()
+            return
         distance, turn = wheel_increment(self.robot, rolled)
-        distance = self._distance.true_step(distance, moving=state.moving)
-        counted = counted._replace(moving=bool(distance))
-        return self._real(
-            counted, Odometry(ticks.time_ns, ticks.sensor, ticks.seq, state.last_ns, distance, wrap_angle(turn))
-        )
+        distance = self._distance.true_step(distance, moving=self._moving)
+        self._moving = bool(distance)
+        self._drive(self._last_ns, ticks.time_ns, distance, wrap_angle(turn), True, step)
 
-    def _gyro(self, state: OdometerState, gyro: Gyro) -> OdometerState:
-        if self.robot.turn_source != "gyro":
-            return state
-        rate, before = self.robot.gyro_scale * (gyro.rate_rad_s - self.robot.gyro_bias_rad_s), state.gyro
+    def _integrate(self, gyro: Gyro) -> None:
+        if not self._takes_gyro:
+            return
+        rate, before = self.robot.gyro_scale * (gyro.rate_rad_s - self.robot.gyro_bias_rad_s), self._gyro
         if before is None:
-            first = _GyroAngle(gyro.time_ns, 0.0, rate)
-            return state._replace(gyro=first, gyro_angle_at_last=first.at(state.last_ns))
+            self._gyro = _GyroAngle(gyro.time_ns, 0.0, rate)
+            self._gyro_angle_at_last = self._gyro.at(self._last_ns)
+            return
         mean_rate = 0.5 * (before.rate + rate)
         angle = before.angle + mean_rate * seconds(gyro.time_ns - before.time_ns)
-        return state._replace(gyro=_GyroAngle(gyro.time_ns, angle, rate))
+        self._gyro = _GyroAngle(gyro.time_ns, angle, rate)

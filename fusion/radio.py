@@ -65,6 +65,9 @@ class DistanceModel(Protocol):
     def by_gain(self, distance_m: ArrayLike) -> Floats:
         """Derivative of ``expected`` by that common error."""
 
+    def at(self, distance_m: float) -> tuple[float, float, float]:
+        """`expected`, `slope` and `by_gain` at one distance, in plain numbers: a filter needs few of them, often."""
+
 
 @dataclass(frozen=True, slots=True)
 class PathLoss:
@@ -134,6 +137,14 @@ class PathLoss:
         ratio = np.maximum(distance_m, self.reference_distance_m) / self.reference_distance_m
         return np.asarray(-10.0 * np.log10(ratio))
 
+    def at(self, distance_m: float) -> tuple[float, float, float]:
+        """RSSI [dBm], its slope [dB/m], and dRSSI/dn [dB]."""
+        if distance_m < self.reference_distance_m:
+            return self.rssi_at_reference_dbm, 0.0, 0.0
+        decades = math.log10(distance_m / self.reference_distance_m)
+        slope = -10.0 * self.path_loss_exponent / math.log(10.0) / distance_m
+        return self.rssi_at_reference_dbm - 10.0 * self.path_loss_exponent * decades, slope, -10.0 * decades
+
 
 @dataclass(frozen=True, slots=True)
 class Ranging:
@@ -180,3 +191,7 @@ class Ranging:
     def by_gain(self, distance_m: ArrayLike) -> Floats:
         """The distance itself."""
         return np.asarray(distance_m)
+
+    def at(self, distance_m: float) -> tuple[float, float, float]:
+        """Range [m], the scale, and the distance [m]."""
+        return self.scale * distance_m + self.offset_m, self.scale, distance_m

@@ -37,14 +37,9 @@ class RadioReading(NamedTuple):
         arm_x, arm_y = c * antenna_m[0] - s * antenna_m[1], s * antenna_m[0] + c * antenna_m[1]
         dx, dy, dz = x + arm_x - self.anchor.x, y + arm_y - self.anchor.y, antenna_m[2] - self.anchor.z
         distance = max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-6)
-        slope = float(self.model.slope(distance)) / distance
-        return Expectation(
-            float(self.model.expected(distance)),
-            slope * dx,
-            slope * dy,
-            slope * (dy * arm_x - dx * arm_y),
-            float(self.model.by_gain(distance)),
-        )
+        value, slope, by_gain = self.model.at(distance)
+        slope /= distance
+        return Expectation(value, slope * dx, slope * dy, slope * (dy * arm_x - dx * arm_y), by_gain)
 
     def expected_values(
         self,

@@ -5,19 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from fusion.fates import fate, unusable
+from fusion.fates import fate
 from fusion.values import (
     Decision,
     Fate,
     Gyro,
-    Measurement,
+    Motion,
     MotorCommand,
     Odometry,
+    Radio,
     RangeReading,
-    Ranges,
     Reason,
     RssiReading,
-    WifiScan,
     nanoseconds,
 )
 from fusion.world import World
@@ -28,36 +27,37 @@ RSSI_RANGE_DBM = (-120.0, 20.0)
 """Signal strengths a receiver can report; others are codes for "nothing received", such as 0 x 256 or 127."""
 
 
-def screen(world: World, measurement: Measurement) -> tuple[Measurement | None, tuple[Fate, ...]]:
-    """``measurement`` without its unusable readings (None: nothing is left), and the Fates of those."""
-    if isinstance(measurement, WifiScan | Ranges):
-        return _screen_radio(world, measurement)
+def motion_flaw(measurement: Motion) -> Reason | None:
+    """The reason why a measurement of motion cannot be used, or None."""
     if isinstance(measurement, Odometry):
         if measurement.from_ns > measurement.time_ns:
-            return None, unusable(measurement, Reason.BAD_CLOCK)
-        numbers: tuple[float, ...] = (measurement.distance_m, measurement.turn_rad)
+            return Reason.BAD_CLOCK
+        is_finite = math.isfinite(measurement.distance_m) and math.isfinite(measurement.turn_rad)
     elif isinstance(measurement, Gyro):
-        numbers = (measurement.rate_rad_s,)
+        is_finite = math.isfinite(measurement.rate_rad_s)
     elif isinstance(measurement, MotorCommand):
-        numbers = measurement.wheel_speeds_m_s
+        is_finite = all(map(math.isfinite, measurement.wheel_speeds_m_s))
     else:
-        numbers = ()
-    if not all(map(math.isfinite, numbers)):
-        return None, unusable(measurement, Reason.NOT_FINITE)
-    return measurement, ()
+        is_finite = True
+    return None if is_finite else Reason.NOT_FINITE
 
 
-def _screen_radio(world: World, scan: WifiScan | Ranges) -> tuple[Measurement | None, tuple[Fate, ...]]:
+def screen_radio(world: World, scan: Radio) -> tuple[Radio | None, tuple[Fate, ...]]:
+    """``scan`` without its unusable readings, the others by anchor (None: nothing is left), and the Fates of those."""
     kept: list[RssiReading | RangeReading] = []
     fates: list[Fate] = []
     seen: set[str] = set()
+    in_order, last = True, ""
     for reading in scan.readings:
         reason = _refusal(world, reading, seen)
         if reason is None:
             kept.append(reading)
             seen.add(reading.anchor)
+            in_order, last = in_order and last <= reading.anchor, reading.anchor
         else:
             fates.append(fate(scan, reading.anchor, Decision.UNUSABLE, reason))
+    if in_order and kept and not fates:
+        return scan, ()
     kept.sort(key=lambda reading: reading.anchor)
     return (replace(scan, readings=tuple(kept)) if kept else None), tuple(fates)  # type: ignore[arg-type]
 

@@ -89,6 +89,10 @@ class World:
     """SHA-256 of the world's content, whatever the order or spelling of its keys."""
     table: str = field(repr=False)
     """The content as canonical JSON: what `hash` is the hash of."""
+    _by_id: Mapping[str, Anchor] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_by_id", {anchor.id: anchor for anchor in self.anchors})
 
     @classmethod
     def load(cls, path: Path) -> World:
@@ -143,7 +147,7 @@ class World:
 
     def anchor(self, anchor_id: str) -> Anchor | None:
         """The anchor of that id, None if the world has none."""
-        return next((anchor for anchor in self.anchors if anchor.id == anchor_id), None)
+        return self._by_id.get(anchor_id)
 
 
 def _read_anchors(table: Mapping[str, Any], antenna_height_m: float) -> tuple[Anchor, ...]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fusion import Gyro, Increment, Measurement, Odometry, Pose, Ranges, WifiScan, World
+from fusion import Gyro, Increment, Measurement, Odometry, Pose, WifiScan, World
 from fusion.odometry import Odometer
 from logs.run import Run
 from sensors.simulation.scenario import Reality
@@ -44,19 +44,18 @@ def leg_by_leg(run: Run) -> Run:
     even to the distance travelled; it is some fifty times shorter.
     """
     assert run.prior is not None
-    odometer, told = Odometer(run.world.robot), list[Measurement]()
-    state, motion, since_ns = odometer.start(run.prior.time_ns), Increment(), run.prior.time_ns
+    since_ns, measurements = run.prior.time_ns, list[Measurement]()
+    odometer, motion = Odometer(run.world.robot, since_ns), Integral(run.world.robot.noise, Increment())
     for measurement in run.measurements:
-        if isinstance(measurement, WifiScan | Ranges):
-            state, steps = odometer.hold(state, measurement.time_ns)
+        if isinstance(measurement, Radio):
+            odometer.hold(measurement.time_ns, motion.extend)
         else:
-            state, steps = odometer.advance(state, measurement)
-        for step in steps:
-            motion = motion.extend(step, run.world.robot.noise)
+            odometer.advance(measurement, motion.extend)
         if isinstance(measurement, WifiScan):
-            told += [*_leg(motion, since_ns, measurement.time_ns), measurement]
-            motion, since_ns = Increment(), measurement.time_ns
-    return replace(run, measurements=tuple(told))
+            measurements += [*_leg(motion.increment, since_ns, measurement.time_ns), measurement]
+            since_ns = measurement.time_ns
+            motion.restart(Increment())
+    return replace(run, measurements=tuple(measurements))
 
 
 def _leg(motion: Increment, from_ns: int, until_ns: int) -> list[Odometry]:

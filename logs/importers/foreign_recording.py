@@ -41,7 +41,7 @@ class Recording:
     def write(self, path: Path) -> Path:
         """Write it as a log, in the order of arrival."""
         values: list[Measurement | Truth] = [*self.measurements, *self.truths]
-        keys = [order(m) for m in self.measurements]
+        keys: list[tuple[int, int, str, int]] = [order(m) for m in self.measurements]
         keys += [(truth.time_ns, 2, "", i) for i, truth in enumerate(self.truths)]
         arrivals = [value.time_ns for value in values] if self.arrivals_ns is None else self.arrivals_ns
         rows = sorted(zip(arrivals, keys, values, strict=True), key=lambda row: row[:2])

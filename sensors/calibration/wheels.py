@@ -83,10 +83,13 @@ def _steps(robot: Robot, measurements: list[Odometry | WheelTicks | MotorCommand
     """All increments in order of time, those that no time passes in left out."""
     if not measurements:
         return []
-    odometer, steps = Odometer(robot), list[Odometry]()
-    first = measurements[0]
-    state = odometer.start(first.from_ns if isinstance(first, Odometry) else first.time_ns)
+    first, steps = measurements[0], list[Odometry]()
+
+    def add(from_ns: int, time_ns: int, distance_m: float, turn_rad: float, measured: bool) -> None:
+        if time_ns > from_ns:
+            steps.append(Odometry(time_ns, "wheels", len(steps), from_ns, distance_m, turn_rad, measured))
+
+    odometer = Odometer(robot, first.from_ns if isinstance(first, Odometry) else first.time_ns)
     for measurement in measurements:
-        state, motion = odometer.advance(state, measurement)
-        steps += [step for step in motion if isinstance(step, Odometry) and step.time_ns > step.from_ns]
+        odometer.advance(measurement, add)
     return steps

@@ -13,6 +13,7 @@ from benchmarks.paper.variants import without_gyro
 from benchmarks.runner.estimator_run import run_estimator
 from fusion import (
     Covariance,
+    Increment,
     Odometry,
     ParameterError,
     Pose,
@@ -143,7 +144,9 @@ def test_filter_that_is_told_how_long_shadowing_lasts_is_not_made_sure_by_its_re
 def test_error_of_an_anchor_is_a_state_where_the_world_tells_its_length_or_a_parameter_asks():
     def states(place, **options):
         estimator = build("ekf", place, options)
-        return len(estimator.start(START, seed=0).mean)
+        state = estimator.start(START, seed=0)
+        scan = WifiScan(1, "wifi", 0, tuple(RssiReading(anchor.id, -50.0) for anchor in place.anchors))
+        return len(estimator.step(state, Increment(), scan)[0].mean)
 
     assert states(world()) == states(world(**TOLD), estimate_rssi_bias=False) < states(world(**TOLD))
     assert states(world(), estimate_rssi_bias=True) == states(world(**TOLD))

@@ -25,7 +25,6 @@ from fusion import (
     World,
 )
 from fusion.conformance.synthetic_run import SyntheticRun
-from fusion.motion import step_noise
 from fusion.values import NANOSECONDS
 from logs.run import Run
 from logs.truth import TruthTrack, evaluation_instants
@@ -36,6 +35,22 @@ EXACT = {
     "turn_bias_std_rad_s": 0.0,
 }
 """No error that stays for a whole run."""
+
+
+def step_noise(noise, odometry):
+    """Variances of one step forward, sideways and of the turn, as `OdometryNoise` has them."""
+    path_m, turn_rad, duration_s = (
+        abs(odometry.distance_m),
+        abs(odometry.turn_rad),
+        1e-9 * (odometry.time_ns - odometry.from_ns),
+    )
+    return (
+        noise.distance_std_per_sqrt_m**2 * path_m + noise.distance_std_per_sqrt_s**2 * duration_s,
+        noise.side_std_per_sqrt_m**2 * path_m,
+        noise.turn_std_per_sqrt_rad**2 * turn_rad
+        + noise.turn_std_per_sqrt_m**2 * path_m
+        + noise.turn_std_per_sqrt_s**2 * duration_s,
+    )
 
 
 def a_run(world, measurements, truths, prior):

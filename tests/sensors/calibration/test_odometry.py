@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusion import LogError, Odometry, Pose
+from fusion import LogError, Pose
 from fusion.odometry import Odometer
 from fusion.robot import Robot
 from fusion.values import nanoseconds
@@ -89,14 +89,10 @@ def test_what_is_fitted_is_what_estimators_get(drive):
     scales = WheelScales(0.98, 1.01, 0.33)
     robot = scales.applied_to(run.world.robot)
     assert WheelScales.of(robot) == pytest.approx(scales)
-    odometer, moved = Odometer(robot), [0.0, 0.0]
-    state = odometer.start(run.measurements[0].time_ns)
+    odometer, steps = Odometer(robot, run.measurements[0].time_ns), []
     for measurement in run.measurements:
-        state, motion = odometer.advance(state, measurement)
-        for step in motion:
-            if isinstance(step, Odometry):
-                moved[0] += step.distance_m
-                moved[1] += step.turn_rad
+        odometer.advance(measurement, lambda *step: steps.append(step))
+    moved = [sum(distance_m for _, _, distance_m, _, _ in steps), sum(turn_rad for _, _, _, turn_rad, _ in steps)]
     told = wheels(run)
     end = arc_end(scales, np.diff(told.left), np.diff(told.right))
     ahead = 0.5 * (scales.left * told.left[-1] + scales.right * told.right[-1])

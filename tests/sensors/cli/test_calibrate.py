@@ -10,7 +10,7 @@ import pytest
 from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.matching import match
 from benchmarks.runner.estimator_run import run_estimator
-from fusion import Truth, World
+from fusion import Odometry, Truth, World
 from fusion.cli.main import main
 from fusion.odometry import Odometer
 from fusion.world import Calibration
@@ -104,13 +104,14 @@ def test_an_anchors_own_key_does_not_hide_what_was_fitted_for_all():
 def test_ready_made_increments_are_judged_and_fill_no_world(drive, tmp_path, capsys):
     """What a robot's own computer made of its ticks: the world's wheels do not touch it."""
     run = drive(laps=2, distance_scale_bias=0.03)
-    odometer, path = Odometer(run.world.robot), tmp_path / "made.mcap"
-    state = odometer.start(run.measurements[0].time_ns)
+    odometer, path = Odometer(run.world.robot, run.measurements[0].time_ns), tmp_path / "made.mcap"
     with RunWriter(path, run.world, name="made") as writer:
+
+        def write(from_ns, time_ns, distance_m, turn_rad, measured):
+            writer.write(Odometry(time_ns, "encoders", time_ns, from_ns, distance_m, turn_rad, measured))
+
         for ticks in run.measurements:
-            state, motion = odometer.advance(state, ticks)
-            for step in motion:
-                writer.write(step)
+            odometer.advance(ticks, write)
         write_truth(writer, run)
     output = tmp_path / "world.toml"
     assert main(["calibrate", "odometry", str(path), "-o", str(output)]) == 1
