@@ -43,7 +43,10 @@ class Nameless(Good):
 
 class OtherName(Good):
     def poll(self, timeout_s):
-        return [replace(said, sensor="x") if isinstance(said, WheelTicks) else said for said in super().poll(timeout_s)]
+        return [
+            replace(output, sensor="x") if isinstance(output, WheelTicks) else output
+            for output in super().poll(timeout_s)
+        ]
 
 
 class Foretelling(Good):
@@ -131,7 +134,7 @@ def test_each_promise_finds_a_driver_that_breaks_it(promise):
     assert verdict.detail
 
 
-def test_a_driver_without_a_fake_device_is_told_so():
+def test_promises_on_a_fake_device_are_skipped_for_a_driver_without_one():
     class Bare:
         summary = "bare"
 
@@ -147,9 +150,9 @@ def test_the_command_checks_a_driver_by_name(capsys):
     assert "did you mean 'simulated_gyro'" in capsys.readouterr().err
 
 
-def test_driver_whose_package_is_missing_breaks_no_promise_and_says_so_once(monkeypatch, capsys):
+def test_driver_whose_package_is_missing_breaks_no_promise_and_is_reported_once(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "serialx", None)
     assert main(["check", "--driver", "uwb_qm33"]) == 1
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.startswith("fusion check: the package serialx is missing; python3 -m pip install")
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("fusion check: the package serialx is missing; python3 -m pip install")

@@ -50,13 +50,9 @@ from fusion.radio import PathLoss, Ranging, free_space_loss_db
 from fusion.robot import Robot
 from fusion.trilateration import closed_form, least_squares, trilaterate
 from fusion.values import nanoseconds
+from tests.fusion.streams import ANCHORS
 
 SECOND = 1_000_000_000
-ANCHORS = [
-    {"id": "a", "position_m": [0, 0, 2]},
-    {"id": "b", "position_m": [8, 0, 2]},
-    {"id": "c", "position_m": [1, 6, 2]},
-]
 NAMES = [name for name in fusion.names() if name != "nearest"]
 reals = st.floats(-50.0, 50.0)
 angles = st.floats(-3.0, 3.0)
@@ -242,7 +238,7 @@ def test_a_wheel_that_rolls_out_after_a_command_to_stand_goes_on_in_its_directio
     assert motion.turn_rad == pytest.approx(2 * 2 * 0.0102 / 0.15)
 
 
-def test_wheels_of_two_sizes_are_told_apart_and_their_mean_is_kept():
+def test_wheels_of_two_sizes_are_distinguished_and_their_mean_is_kept():
     """Borenstein & Feng: with the right wheel 2 % larger, equal counts are a left turn over the same distance."""
     distance, turn = wheel_increment(Robot(drive="differential", track_width_m=0.5, diameter_ratio=1.02), (1.0, 1.0))
     assert distance == pytest.approx(1.0)
@@ -258,7 +254,7 @@ def test_gyro_scale_stretches_what_is_left_without_the_bias():
     assert motion.turn_rad == pytest.approx(0.6)
 
 
-def test_gyro_gives_the_turn_where_the_world_says_so():
+def test_gyro_gives_the_turn_where_the_world_makes_it_the_source():
     odometer = Odometer(Robot(drive="differential", turn_source="gyro", gyro_bias_rad_s=0.1))
     state = odometer.start(0)
     for k in range(11):
@@ -295,7 +291,7 @@ DRIVE = SyntheticRun(noisy=True, duration_s=8.0)
 
 
 def cut(measurements, at_ns):
-    """What is told of the time after ``at_ns``: the increment across it in two, the first of them left out."""
+    """The measurements of the time after ``at_ns``: the increment across it in two, the first of them left out."""
     for m in measurements:
         if m.time_ns < at_ns or (isinstance(m, Odometry) and m.time_ns == at_ns):
             continue
@@ -313,11 +309,11 @@ def started_at(time_ns):
 @given(st.integers(0, nanoseconds(6.0)) | st.integers(0, 60).map(lambda k: k * SECOND // 10))
 @settings(derandomize=True, max_examples=15)
 def test_run_started_anywhere_counts_no_motion_before_its_start(name, at_ns):
-    """Cut between two increments or inside one: as if the odometry before had never been told, in pose and noise."""
+    """Cut between two increments or inside one: as if the odometry before had never been, in pose and noise."""
     measurements, place, start = DRIVE.measurements(), DRIVE.world(), started_at(at_ns)
     whole, later = (
-        final(track(build(name, place), place, told, start, seed=3))
-        for told in (measurements, cut(measurements, at_ns))
+        final(track(build(name, place), place, stream, start, seed=3))
+        for stream in (measurements, cut(measurements, at_ns))
     )
     whole = [update for update in whole if not (update.fates and update.fates[0].reason is Reason.TOO_LATE)]
     assert len(whole) == len(later)
@@ -533,7 +529,7 @@ def test_public_names_exist():
 
 @pytest.mark.parametrize("count", [3, 4])
 def test_covariance_of_a_fix_is_that_of_its_scatter(count):
-    """Outside the triangle the closed form errs more than least squares would; 4000 draws tell."""
+    """Outside the triangle the closed form errs more than least squares would; 4000 draws show it."""
     anchors = np.array([[0.0, 0.0], [4.0, 0.0], [0.0, 3.0], [5.0, 6.0]])[:count]
     place, stds = np.array([6.0, 5.0]), np.full(count, 0.02)
     exact = np.hypot(*(anchors - place).T)

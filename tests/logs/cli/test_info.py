@@ -23,16 +23,16 @@ from fusion import (
     Tag,
     Truth,
     WifiScan,
-    World,
     registered,
 )
 from fusion.cli.main import main
 from logs.cli.info import describe
 from logs.timing import JUMP_MESSAGES, JUMP_NS, Stream
 from logs.writer import RunWriter
+from tests.worlds import anchored_world, empty_world
 
 SECOND = 1_000_000_000
-WORLD = World.from_table({"name": "here", "bounds": {"x_min": 0, "x_max": 1, "y_min": 0, "y_max": 1}})
+WORLD = empty_world(name="here")
 GYRO_S = (0, 1, 2, 5, 3)
 """Times in the order of their arrival: the last one is late."""
 
@@ -69,20 +69,20 @@ def test_text_names_world_hash_late_stamps_and_what_is_missing(log, capsys):
 
 
 @pytest.mark.parametrize(
-    ("headings", "told"),
+    ("headings", "words"),
     [
         ((0.5, 0.5), "2 poses"),
         ((0.5, None), "2 poses, the heading known at 1 of them"),
         ((None, math.nan), "2 poses, the heading known at none of them"),
     ],
 )
-def test_true_headings_are_counted(tmp_path, capsys, headings, told):
+def test_true_headings_are_counted(tmp_path, capsys, headings, words):
     with RunWriter(tmp_path / "run.mcap", WORLD, name="walk") as writer:
         writer.write(Gyro(0, "g", 0, 0.0))
         for i, heading in enumerate(headings):
             writer.write_truth(Truth(i, 1.0, 2.0, heading))
     assert main(["info", str(tmp_path / "run.mcap")]) == 0
-    assert f"truth: {told}\n" in capsys.readouterr().out
+    assert f"truth: {words}\n" in capsys.readouterr().out
 
 
 def test_cut_off_log_is_described_with_its_warning(log, capsys):
@@ -98,7 +98,7 @@ def test_file_that_is_no_log_is_one_sentence_and_exit_1(tmp_path, capsys):
     assert "is no MCAP file" in line
 
 
-def test_foreign_bag_is_told_topic_by_topic_with_the_roles_each_could_play(tmp_path, ros, capsys):
+def test_foreign_bag_is_described_topic_by_topic_with_the_roles_each_could_play(tmp_path, ros, capsys):
     rows = [("/odom", t * SECOND, ros.odometry(t * SECOND, 0.0, 0.0, 0.0)) for t in range(5)]
     rows += [
         (
@@ -128,7 +128,7 @@ def test_foreign_bag_is_told_topic_by_topic_with_the_roles_each_could_play(tmp_p
     assert "fusion import rosbag" in text
 
 
-def test_foreign_bag_cut_off_is_told_with_what_cannot_be_read(tmp_path, ros, capsys):
+def test_foreign_bag_cut_off_is_described_with_what_cannot_be_read(tmp_path, ros, capsys):
     (file,) = ros.bag(tmp_path / "walk", [("/imu", SECOND, ros.imu(SECOND, 0.5))]).glob("*.mcap")
     file.write_bytes(file.read_bytes()[:-30])
     assert main(["info", str(file)]) == 0
@@ -165,17 +165,17 @@ def test_clock_jump_is_found_where_it_is_and_a_late_message_is_none(place, jump_
     assert abs(by_ns - jump_s * SECOND) <= JUMP_NS / 2
 
 
-def test_short_stream_tells_of_no_jump():
+def test_short_stream_has_no_jump():
     assert stream(range(19), [0] * 10 + [SECOND] * 9).jumps() == []
 
 
-def test_gaps_are_counted_and_placed_and_twins_are_told():
+def test_gaps_are_counted_and_placed_and_twins_are_counted():
     timing = stream([0, 1, 2, 3, 10, 11, 12, 20, 20, 21], [0] * 10, [0, 1, 2, 3, 4, 5, 6, 7, 7, 8]).timing(0)
     assert (timing["gaps"], timing["duplicates"]) == (2, 1)
     assert (timing["longest_gap_s"], timing["longest_gap_at_s"]) == (8e-9, 12e-9)
 
 
-def test_clock_of_the_recorder_that_is_set_back_is_told_in_words(tmp_path, capsys):
+def test_clock_of_the_recorder_that_is_set_back_is_reported_in_words(tmp_path, capsys):
     """It arrives a second late each time; the log time is set back by 15 s before number 20, and number 30 is lost."""
     path = tmp_path / "run.mcap"
     with RunWriter(path, WORLD, name="back") as writer:
@@ -192,9 +192,7 @@ def test_clock_of_the_recorder_that_is_set_back_is_told_in_words(tmp_path, capsy
     assert "clock jump at 20.0 s: its delay changes by -15.00 s, times that the log time runs backwards: 1" in text
 
 
-ANCHORED = World.from_table(
-    {"name": "here", "anchors": [{"id": i, "position_m": p} for i, p in (("a", [0, 0]), ("b", [9, 0]), ("c", [0, 9]))]}
-)
+ANCHORED = anchored_world({"a": (0, 0), "b": (9, 0), "c": (0, 9)}, name="here")
 KNOWN = Prior(0, Pose(3.0, 3.0, 0.0), Covariance.from_std(0.1, 0.1, 0.1))
 SPEED_M_S = 0.1
 
@@ -306,7 +304,7 @@ def test_radio_that_begins_late_is_replayed_all_the_same(tmp_path):
     assert (row["usable"], row["readings"], row["used"]) == (True, 1, 1)
 
 
-def test_estimator_that_fails_on_the_log_is_told_with_its_error(tmp_path):
+def test_estimator_that_fails_on_the_log_is_listed_with_its_error(tmp_path):
     path = tmp_path / "run.mcap"
     with RunWriter(path, ANCHORED, name="test", prior=KNOWN) as writer:
         for number in range(1, 4):
@@ -318,7 +316,7 @@ def test_estimator_that_fails_on_the_log_is_told_with_its_error(tmp_path):
     assert "Broken failed at its start: KeyError('start')" in rows["broken"]["lacks"][0]
 
 
-def test_several_files_are_told_and_one_that_is_none_does_not_hide_the_others(tmp_path, log, capsys):
+def test_several_files_are_described_and_one_that_is_none_does_not_hide_the_others(tmp_path, log, capsys):
     other = drive(tmp_path / "drive.mcap")
     (tmp_path / "odd.mcap").write_text("hello")
     assert main(["info", str(log), str(other), "--json"]) == 0
@@ -329,7 +327,7 @@ def test_several_files_are_told_and_one_that_is_none_does_not_hide_the_others(tm
     assert "is no MCAP file" in err
 
 
-def test_json_of_a_damaged_log_holds_what_repair_would_tell(tmp_path, log, capsys):
+def test_json_of_a_damaged_log_holds_what_repair_would_state(tmp_path, log, capsys):
     with log.open("rb") as stream:
         last = make_reader(stream).get_summary().chunk_indexes[-1]
     log.write_bytes(log.read_bytes()[: last.chunk_start_offset + 30])

@@ -32,7 +32,7 @@ GRAVITY = (0.0, 0.0, 9.81)
 
 @pytest.fixture
 def drive(ros):
-    """Rows of a drive with every role told once, each message 1 ms late."""
+    """Rows of a drive with every role played once, each message 1 ms late."""
     rows = [("/odom", ros.odometry(t * SECOND, x, y, heading), t) for t, x, y, heading in POSES]
     rows += [("/imu/data", ros.imu(t * SECOND, 0.1 * t), t) for t in range(1, 5)]
     rows += [("/uwb/a", ros.range(2 * SECOND, "a", 2.5), 2), ("/uwb/b", ros.range(2 * SECOND, "b", 4.5), 2)]
@@ -91,7 +91,7 @@ def test_measurements_come_in_the_order_they_arrived_and_late_odometry_is_chaine
         ("/odom", 3 * SECOND, ros.odometry(3 * SECOND, 3.0, 0.0, 0.0)),
         ("/imu", 4 * SECOND, ros.imu(2 * SECOND, 0.5)),
         ("/odom", 5 * SECOND, ros.odometry(2 * SECOND, 2.5, 0.0, 0.0)),
-        ("/odom", 6 * SECOND, ros.odometry(2 * SECOND, 9.0, 9.0, 0.0)),  # a stamp told twice: the first counts
+        ("/odom", 6 * SECOND, ros.odometry(2 * SECOND, 9.0, 9.0, 0.0)),  # a stamp met twice: the first counts
     ]
     run = read_bag(ros.bag(tmp_path / "bag", rows), WORLD)
     assert run.measurements == (
@@ -110,7 +110,7 @@ def test_odometry_that_was_started_anew_counts_as_motion_not_measured(tmp_path, 
     assert "/odom: jumps 1 times" in warning
 
 
-def test_sideways_motion_is_told(tmp_path, ros):
+def test_sideways_motion_is_reported(tmp_path, ros):
     rows = [("/odom", t * SECOND, ros.odometry(t * SECOND, 1.0 * t, 0.5 * t, 0.0)) for t in range(3)]
     run = read_bag(ros.bag(tmp_path / "bag", rows), WORLD)
     assert [step.distance_m for step in run.measurements] == [1.0, 1.0]
@@ -126,8 +126,8 @@ def test_wheel_angles_become_odometry_by_circumference_and_track(tmp_path, ros, 
     ]
     rows.insert(1, ("/joint_states", SECOND + 1, ros.joints(SECOND + 1, arm=8.0)))
     run = read_bag(ros.bag(tmp_path / "bag", rows), WORLD, asked)
-    told = [(step.from_ns, step.time_ns, step.distance_m, step.turn_rad) for step in run.measurements]
-    assert told == [
+    reported = [(step.from_ns, step.time_ns, step.distance_m, step.turn_rad) for step in run.measurements]
+    assert reported == [
         (SECOND, 2 * SECOND, pytest.approx(0.15, abs=1e-15), pytest.approx(0.2, abs=1e-15)),
         (2 * SECOND, 3 * SECOND, pytest.approx(0.05, abs=1e-15), pytest.approx(-0.2, abs=1e-15)),
     ]
@@ -199,7 +199,7 @@ def test_ranges_are_of_the_anchor_that_the_mapping_names(tmp_path, ros):
     assert run.warnings == ()
 
 
-def test_ranges_of_no_anchor_are_left_out_and_told_unless_they_are_named(tmp_path, ros):
+def test_ranges_of_no_anchor_are_left_out_and_reported_unless_they_are_named(tmp_path, ros):
     rows = [("/sonar", SECOND, ros.range(SECOND, "bumper", 0.5)), ("/uwb", SECOND, ros.range(SECOND, "a", 1.5))]
     bag = ros.bag(tmp_path / "bag", rows)
     run = read_bag(bag, WORLD)
@@ -276,14 +276,14 @@ def test_odometry_without_orientation_is_not_chained_and_counted(tmp_path, ros, 
     first, last = of(run, Odometry)
     assert (first.from_ns, first.time_ns, last.from_ns) == (SECOND, 3 * SECOND, 3 * SECOND)
     assert first.turn_rad == pytest.approx(math.pi / 2)
-    assert any("/odom: 1 of 4 poses lack heading or position, and are left out" in told for told in run.warnings)
+    assert any("/odom: 1 of 4 poses lack heading or position, and are left out" in warning for warning in run.warnings)
     blind = [("/odom", t * SECOND, ros.odometry(t * SECOND, x, y, unknown)) for t, x, y, _ in POSES]
     none = read_bag(ros.bag(tmp_path / "none", [*blind, ("/imu", SECOND, ros.imu(SECOND, 0.1))]), WORLD)
     assert of(none, Odometry) == []
-    assert any("/odom: 4 of 4 poses lack heading" in told for told in none.warnings)
+    assert any("/odom: 4 of 4 poses lack heading" in warning for warning in none.warnings)
 
 
-def test_truth_is_never_guessed_and_its_candidates_are_told(tmp_path, ros, drive):
+def test_truth_is_never_guessed_and_its_candidates_are_named(tmp_path, ros, drive):
     rows = [*drive, ("/goal_pose", SECOND, ros.pose(SECOND, 9.0, 9.0))]
     run = read_bag(ros.bag(tmp_path / "bag", rows), WORLD)
     assert run.truth is None
@@ -356,10 +356,10 @@ def test_pose_that_is_not_finite_is_no_truth(tmp_path, ros):
     rows = [("/gt", t * SECOND, ros.pose(t * SECOND, x, 0.0)) for t, x in ((1, 1.0), (2, math.nan), (3, 3.0))]
     run = read_bag(ros.bag(tmp_path / "bag", rows), WORLD, {"truth": "/gt"})
     assert run.truth.x.tolist() == [1.0, 3.0]
-    assert any("1 of 3 true poses have no position, and are left out" in told for told in run.warnings)
+    assert any("1 of 3 true poses have no position, and are left out" in warning for warning in run.warnings)
 
 
-def test_stamps_that_were_never_set_are_told(tmp_path, ros):
+def test_stamps_that_were_never_set_are_reported(tmp_path, ros):
     run = read_bag(ros.bag(tmp_path / "bag", [("/imu", t, ros.imu(0, 0.5)) for t in (1, 2)]), WORLD)
     assert "all messages of /imu carry one and the same stamp" in run.warnings[0]
 
@@ -421,17 +421,17 @@ def test_clock_of_the_log_may_be_another_than_that_of_the_stamps(tmp_path, ros, 
     assert read_run(path).measurements == read_bag(bag, WORLD).measurements
 
 
-def test_command_line_imports_a_bag_and_tells_what_is_doubtful(tmp_path, ros, drive, capsys):
+def test_command_line_imports_a_bag_and_reports_what_is_doubtful(tmp_path, ros, drive, capsys):
     bag = ros.bag(tmp_path / "bag", drive)
     (tmp_path / "world.toml").write_text(tomlkit.dumps(TABLE))
     out = str(tmp_path / "run.mcap")
     words = ["import", "rosbag", str(bag), "--world", str(tmp_path / "world.toml"), "--topic", "odom=/odom", "-o", out]
     assert main(words) == 0
-    told = capsys.readouterr()
-    assert told.out == f"{out}\n"
-    assert told.err.startswith("warning: ")
-    assert "it may be in /mocap" in told.err
-    assert read_run(tmp_path / "run.mcap").metadata["warnings"] in told.err
+    reported = capsys.readouterr()
+    assert reported.out == f"{out}\n"
+    assert reported.err.startswith("warning: ")
+    assert "it may be in /mocap" in reported.err
+    assert read_run(tmp_path / "run.mcap").metadata["warnings"] in reported.err
     words += ["--topic", "truth=/mocap", "--truth-to-map", "1", "2", "0", "--force"]
     assert main(words) == 0
     assert not capsys.readouterr().err
