@@ -7,17 +7,7 @@ import pytest
 
 from estimators.bayes_grid import BayesGrid, floor_kernel, turn_kernel
 from estimators.ekf import Ekf
-from fusion import (
-    Covariance,
-    Decision,
-    Odometry,
-    ParameterError,
-    Pose,
-    Prior,
-    RangeReading,
-    Ranges,
-    digest,
-)
+from fusion import Covariance, Decision, Odometry, ParameterError, Pose, Prior, RangeReading, Ranges, digest
 from fusion.values import NANOSECONDS as SECOND
 from tests.estimators.stepping import prior, radio_updates
 from tests.worlds import circle, ranged_world

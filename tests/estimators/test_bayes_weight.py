@@ -8,18 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimators.bayes_weight import BayesWeight
-from fusion import (
-    Covariance,
-    Decision,
-    Odometry,
-    ParameterError,
-    Pose,
-    Prior,
-    Ranges,
-    Reason,
-    final,
-    track,
-)
+from fusion import Covariance, Decision, Odometry, ParameterError, Pose, Prior, Ranges, Reason, final, track
 from fusion.trilateration import Fix
 from fusion.values import NANOSECONDS as SECOND
 from tests.estimators.stepping import Stepped

@@ -8,18 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimators.dead_reckoning import DeadReckoning
-from fusion import (
-    Covariance,
-    Decision,
-    Increment,
-    Odometry,
-    Pose,
-    Prior,
-    RangeReading,
-    Ranges,
-    Reason,
-    compose,
-)
+from fusion import Covariance, Decision, Increment, Odometry, Pose, Prior, RangeReading, Ranges, Reason, compose
 from fusion.values import NANOSECONDS as SECOND
 from tests.estimators.stepping import Stepped
 from tests.worlds import empty_world

@@ -6,18 +6,7 @@ import numpy as np
 import pytest
 
 from estimators.dynamic_weight import DynamicWeight, allocate, weighted_average
-from fusion import (
-    Covariance,
-    Decision,
-    Odometry,
-    ParameterError,
-    Pose,
-    Prior,
-    Reason,
-    RssiReading,
-    WifiScan,
-    World,
-)
+from fusion import Covariance, Decision, Odometry, ParameterError, Pose, Prior, Reason, RssiReading, WifiScan, World
 from fusion.values import NANOSECONDS as SECOND
 from tests.estimators.stepping import Stepped
 from tests.worlds import anchored_world, exact_ranges

@@ -7,16 +7,7 @@ import pytest
 
 from estimators.dynamic_weight import DynamicWeight
 from estimators.dynamic_weight_repaired import DynamicWeightRepaired, State, average
-from fusion import (
-    Covariance,
-    Decision,
-    Increment,
-    Odometry,
-    ParameterError,
-    Pose,
-    Prior,
-    Reason,
-)
+from fusion import Covariance, Decision, Increment, Odometry, ParameterError, Pose, Prior, Reason
 from fusion.trilateration import Fix
 from fusion.values import NANOSECONDS as SECOND
 from tests.estimators.stepping import Stepped

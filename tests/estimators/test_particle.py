@@ -7,16 +7,7 @@ import pytest
 
 from estimators.ekf import Ekf
 from estimators.particle import HEADING, Particle, moved, resampled
-from fusion import (
-    Covariance,
-    Decision,
-    Increment,
-    Odometry,
-    ParameterError,
-    Pose,
-    compose,
-    digest,
-)
+from fusion import Covariance, Decision, Increment, Odometry, ParameterError, Pose, compose, digest
 from fusion.values import NANOSECONDS as SECOND
 from tests.estimators.stepping import NOISE, Stepped, prior, radio_updates
 from tests.worlds import circle, ranged_world

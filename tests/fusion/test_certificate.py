@@ -5,18 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from fusion import (
-    Decision,
-    Estimate,
-    Fate,
-    Increment,
-    Odometry,
-    Pose,
-    Reason,
-    Update,
-    digest,
-    final,
-)
+from fusion import Decision, Estimate, Fate, Increment, Odometry, Pose, Reason, Update, digest, final
 from fusion.certificate import Certificate
 from tests.fusion.streams import (
     CLOSED_S,

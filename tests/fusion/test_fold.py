@@ -7,14 +7,7 @@ import weakref
 import pytest
 from hypothesis import given
 
-from fusion import (
-    Estimate,
-    ParameterError,
-    PluginError,
-    Update,
-    build,
-    digest,
-)
+from fusion import Estimate, ParameterError, PluginError, Update, build, digest
 from fusion.fold import Fold
 from fusion.timeline import Timeline
 from fusion.tracker import Tracker
