@@ -16,7 +16,7 @@ from fusion.fates import unusable
 from fusion.motion import Increment
 from fusion.odometry import Odometer, OdometerState
 from fusion.screen import screen
-from fusion.values import Fate, Gyro, Measurement, Odometry, Radio, Ranges, Reason, WifiScan
+from fusion.values import Fate, Gyro, Measurement, Odometry, Radio, Reason
 from fusion.world import World
 
 
@@ -80,7 +80,7 @@ class FrontEnd:
         kept, fates = screen(self._world, measurement)
         if kept is None:
             return state, (), fates
-        if isinstance(kept, WifiScan | Ranges):
+        if isinstance(kept, Radio):
             odometer, steps = self._odometer.hold(state.odometer, kept.time_ns)
             motion, closed = self._integrated(state.motion, steps)
             epoch = Epoch(kept.time_ns, motion, kept)

@@ -10,7 +10,7 @@ from fusion.correlated_error import total_variance
 from fusion.geometry import Covariance, Pose
 from fusion.radio_reading import RadioReading
 from fusion.robot import Robot
-from fusion.values import Decision, Fate, Measurement, Radio, Ranges, Reason, WifiScan
+from fusion.values import Decision, Fate, Measurement, Radio, Reason
 
 
 def fate(measurement: Measurement, anchor: str, decision: Decision, reason: Reason) -> Fate:
@@ -20,7 +20,7 @@ def fate(measurement: Measurement, anchor: str, decision: Decision, reason: Reas
 
 def refused(measurement: Measurement, decision: Decision, reason: Reason) -> tuple[Fate, ...]:
     """The Fates of a measurement none of whose readings could be used: one per anchor, or one without."""
-    anchors = [r.anchor for r in measurement.readings] if isinstance(measurement, WifiScan | Ranges) else [""]
+    anchors = [r.anchor for r in measurement.readings] if isinstance(measurement, Radio) else [""]
     return tuple(fate(measurement, anchor, decision, reason) for anchor in anchors)
 
 

@@ -13,11 +13,10 @@ from fusion.values import (
     Measurement,
     MotorCommand,
     Odometry,
+    Radio,
     RangeReading,
-    Ranges,
     Reason,
     RssiReading,
-    WifiScan,
     nanoseconds,
 )
 from fusion.world import World
@@ -30,7 +29,7 @@ RSSI_RANGE_DBM = (-120.0, 20.0)
 
 def screen(world: World, measurement: Measurement) -> tuple[Measurement | None, tuple[Fate, ...]]:
     """``measurement`` without its unusable readings (None: nothing is left), and the Fates of those."""
-    if isinstance(measurement, WifiScan | Ranges):
+    if isinstance(measurement, Radio):
         return _screen_radio(world, measurement)
     if isinstance(measurement, Odometry):
         if measurement.from_ns > measurement.time_ns:
@@ -47,7 +46,7 @@ def screen(world: World, measurement: Measurement) -> tuple[Measurement | None, 
     return measurement, ()
 
 
-def _screen_radio(world: World, scan: WifiScan | Ranges) -> tuple[Measurement | None, tuple[Fate, ...]]:
+def _screen_radio(world: World, scan: Radio) -> tuple[Measurement | None, tuple[Fate, ...]]:
     kept: list[RssiReading | RangeReading] = []
     fates: list[Fate] = []
     seen: set[str] = set()

@@ -17,7 +17,7 @@ from fusion.epochs import LONGEST, Epoch, FrontEnd, FrontEndState, Longest
 from fusion.errors import MeasurementError
 from fusion.fates import refused, unusable
 from fusion.motion import Increment
-from fusion.values import Decision, Fate, Measurement, Odometry, Ranges, Reason, WifiScan, nanoseconds
+from fusion.values import Decision, Fate, Measurement, Odometry, Radio, Reason, nanoseconds
 from fusion.world import World
 
 HORIZON_S = 2.0
@@ -30,7 +30,7 @@ Key = tuple[int, int, str, int]
 
 def order(measurement: Measurement) -> Key:
     """The place of a measurement in the total order of a run."""
-    is_radio = isinstance(measurement, WifiScan | Ranges)
+    is_radio = isinstance(measurement, Radio)
     return measurement.time_ns, int(is_radio), measurement.sensor, measurement.seq
 
 

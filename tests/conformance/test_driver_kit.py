@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from fusion.cli.main import main
-from fusion.conformance.checks import Outcome
-from fusion.conformance.driver_promises import DRIVER_PROMISES, driver_verdict
+from fusion.conformance.checks import Check, Outcome, verdict
+from fusion.conformance.driver_promises import DRIVER_PROMISES
 from fusion.driver import DeviceInfo, DriverSpec
 from fusion.errors import DeviceLostError, NotPermittedError
 from fusion.values import WheelTicks
@@ -129,16 +129,16 @@ SPOILT = {
 
 @pytest.mark.parametrize("promise", DRIVER_PROMISES, ids=lambda promise: promise.id)
 def test_each_promise_finds_a_driver_that_breaks_it(promise):
-    verdict = driver_verdict(promise, SPOILT[promise.id])
-    assert verdict.outcome is Outcome.BROKEN
-    assert verdict.detail
+    broken = verdict(Check(promise, SPOILT[promise.id]))
+    assert broken.outcome is Outcome.BROKEN
+    assert broken.detail
 
 
 def test_promises_on_a_fake_device_are_skipped_for_a_driver_without_one():
     class Bare:
         summary = "bare"
 
-    outcomes = {promise.id: driver_verdict(promise, Bare).outcome for promise in DRIVER_PROMISES}
+    outcomes = {promise.id: verdict(Check(promise, Bare)).outcome for promise in DRIVER_PROMISES}
     assert outcomes["measures"] is Outcome.SKIPPED
     assert outcomes["discovers_quietly"] is Outcome.BROKEN
 

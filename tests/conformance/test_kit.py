@@ -29,7 +29,7 @@ from fusion import (
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.cli import check as verb
 from fusion.cli.main import main
-from fusion.conformance.checks import PROMISES, Check, Outcome, _verdict, checks, run_checks
+from fusion.conformance.checks import PROMISES, Check, Outcome, checks, run_checks, verdict
 
 
 class State(NamedTuple):
@@ -407,7 +407,7 @@ def test_ids_are_unique_and_every_promise_states_its_reason():
 def verdict_on(estimator, promise_id, excuse=None):
     """What `run_checks` makes of one promise, without the others."""
     (promise,) = (promise for promise in PROMISES if promise.id == promise_id)
-    return _verdict(Check(promise, estimator), excuse)
+    return verdict(Check(promise, estimator), excuse)
 
 
 def test_verdicts_distinguish_broken_excused_and_skipped():
