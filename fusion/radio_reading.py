@@ -9,7 +9,7 @@ import numpy as np
 
 from fusion.arrays import Floats
 from fusion.radio import DistanceModel
-from fusion.values import Ranges, RssiReading, WifiScan
+from fusion.values import Radio, RssiReading
 from fusion.world import Anchor, World
 
 
@@ -55,7 +55,7 @@ class RadioReading(NamedTuple):
         return self.model.expected(np.sqrt(dx * dx + dy * dy + (antenna_m[2] - self.anchor.z) ** 2))
 
 
-def radio_readings(world: World, scan: WifiScan | Ranges) -> tuple[RadioReading, ...]:
+def radio_readings(world: World, scan: Radio) -> tuple[RadioReading, ...]:
     """The readings of a screened scan whose anchors the world has, in their order.
 
     A range's variance is the larger of the world's and the device's own: devices are optimists.

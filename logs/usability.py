@@ -19,11 +19,10 @@ from fusion import (
     Measurement,
     Odometry,
     Prior,
-    Ranges,
+    Radio,
     Tag,
     Update,
     WheelTicks,
-    WifiScan,
     track,
 )
 from logs.prior import starting_prior
@@ -84,7 +83,7 @@ def _missing_data(estimator: Estimator[Any], measurements: Sequence[Measurement]
     if Tag.NO_RADIO in estimator.tags:
         if not any(isinstance(measurement, Odometry | WheelTicks) for measurement in measurements):
             yield "no odometry"
-    elif not any(isinstance(measurement, WifiScan | Ranges) for measurement in measurements):
+    elif not any(isinstance(measurement, Radio) for measurement in measurements):
         yield "no radio readings"
     elif not used:
         yield "no reading of the replay enters it"
@@ -92,11 +91,11 @@ def _missing_data(estimator: Estimator[Any], measurements: Sequence[Measurement]
 
 def _radio_fates(updates: Sequence[Update]) -> list[Fate]:
     """Fates of the readings, each once: an update that was revised counts for the first one."""
-    own = (update for update in updates if not update.revised and isinstance(update.measurement, WifiScan | Ranges))
+    own = (update for update in updates if not update.revised and isinstance(update.measurement, Radio))
     return [fate for update in own for fate in update.fates]
 
 
 def _excerpt(measurements: Sequence[Measurement]) -> Sequence[Measurement]:
     """The beginning of a run: up to enough radio messages, and to the first one however late it comes."""
-    scans = [i + 1 for i, measurement in enumerate(measurements) if isinstance(measurement, WifiScan | Ranges)][:SCANS]
+    scans = [i + 1 for i, measurement in enumerate(measurements) if isinstance(measurement, Radio)][:SCANS]
     return measurements[: max(scans[0], min(scans[-1], MESSAGES)) if scans else MESSAGES]

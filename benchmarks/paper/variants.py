@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fusion import Gyro, Increment, Measurement, Odometry, Pose, WifiScan, World
+from fusion import Gyro, Increment, Measurement, Odometry, Pose, Radio, WifiScan, World
+from fusion.motion import Integral
 from fusion.odometry import Odometer
 from logs.run import Run
 from sensors.simulation.scenario import Reality

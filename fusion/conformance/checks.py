@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from fusion.conformance import answer_promises, motion_promises, purity_promises, robustness_promises, time_promises
 from fusion.conformance.promise import Promise
-from fusion.errors import ConformanceError, ParameterError, did_you_mean
+from fusion.errors import ConformanceError, DependencyError, ParameterError, did_you_mean
 from fusion.plugins import load
 
 PROMISES: list[Promise] = [
@@ -26,10 +26,10 @@ PROMISES: list[Promise] = [
 
 
 class Check(NamedTuple):
-    """One promise put to one estimator class."""
+    """One promise put to one class, of an estimator or a driver."""
 
     promise: Promise
-    estimator: type[Any]
+    made: type[Any]
 
     @property
     def id(self) -> str:
@@ -37,8 +37,8 @@ class Check(NamedTuple):
         return self.promise.id
 
     def run(self) -> None:
-        """Raises `ConformanceError` when the promise is broken; whatever the estimator raises passes through."""
-        self.promise.test(self.estimator)
+        """Raises `ConformanceError` when the promise is broken; whatever the class raises passes through."""
+        self.promise.test(self.made)
 
 
 @unique
@@ -69,7 +69,7 @@ def run_checks(name: str, expected_failures: Mapping[str, str] | None = None) ->
     """A verdict on every promise for the installed estimator ``name``.
 
     ``expected_failures`` excuses promises by id, with the reason; one that is kept after all counts as broken. Raises
-    `PluginError` for an unknown estimator, `ParameterError` for an unknown id.
+    `PluginError` for an unknown estimator, `ParameterError` for an unknown id, `DependencyError` for a missing package.
     """
     excuses = expected_failures or {}
     known = [promise.id for promise in PROMISES]
@@ -77,19 +77,22 @@ def run_checks(name: str, expected_failures: Mapping[str, str] | None = None) ->
         if promise_id not in known:
             raise ParameterError(f"there is no promise {promise_id!r}; {did_you_mean(promise_id, known)}")
     made = load(name)
-    return [_verdict(Check(promise, made), excuses.get(promise.id)) for promise in PROMISES]
+    return [verdict(Check(promise, made), excuses.get(promise.id)) for promise in PROMISES]
 
 
-def _verdict(check: Check, excuse: str | None) -> Verdict:
+def verdict(check: Check, excuse: str | None = None) -> Verdict:
+    """The verdict of one check; raises `DependencyError` where a package is missing, which breaks no promise."""
     promise = check.promise
-    if skip := promise.excuse(check.estimator):
+    if skip := promise.excuse(check.made):
         return Verdict(promise.id, promise.reason, Outcome.SKIPPED, skip)
     try:
         check.run()
     except ConformanceError as broken:
         detail = str(broken)
+    except DependencyError:
+        raise
     except Exception as error:  # noqa: BLE001 - a stranger's code may fail in any way; here that is an answer
-        detail = f"it failed: {error}"
+        detail = f"it failed: {error!r}"
     else:
         detail = "" if excuse is None else f"kept after all: take away the excuse {excuse!r}"
         outcome = Outcome.KEPT if excuse is None else Outcome.BROKEN

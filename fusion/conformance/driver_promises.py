@@ -8,13 +8,14 @@ list, by `fusion check --driver NAME` or, in a test, by `run_driver_checks`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, NamedTuple, cast
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
+from typing import Any, Protocol, cast, runtime_checkable
 
-from fusion.conformance.checks import Outcome, Verdict
-from fusion.conformance.promise import require
+from fusion.conformance.checks import Check, Verdict, verdict
+from fusion.conformance.promise import Promise, promise, require
 from fusion.driver import BootClock, DeviceInfo, Diagnostic, Driver, DriverOutput, DriverSpec, FakeDevice, Found, Level
-from fusion.errors import ConformanceError, DependencyError, DeviceLostError, DriverError, SettingError
+from fusion.errors import ConformanceError, DeviceLostError, DriverError, SettingError
 from fusion.plugins import SENSORS, load
 from fusion.values import Truth, seconds
 
@@ -26,23 +27,18 @@ LATE_S = 2.0
 """Time that a poll may take longer than asked [s]: a whole Wi-Fi scan is never waited for in one."""
 
 
-class DriverPromise(NamedTuple):
-    """A promise. ``test`` raises `ConformanceError`; ``plays``: it needs the driver's fake device."""
+@runtime_checkable
+class DriverWithFake(Protocol):
+    """A driver that ships a stand-in of its device."""
 
-    id: str
-    reason: str
-    test: Callable[[type[Any]], None]
-    plays: bool
-
-
-DRIVER_PROMISES: list[DriverPromise] = []
+    @classmethod
+    def fake(cls) -> AbstractContextManager[FakeDevice]:
+        """A fake device on which the driver plays."""
 
 
-def _promise(promise_id: str, reason: str, *, plays: bool = True) -> Callable[[Callable[[type[Any]], None]], None]:
-    def enlist(test: Callable[[type[Any]], None]) -> None:
-        DRIVER_PROMISES.append(DriverPromise(promise_id, reason, test, plays))
-
-    return enlist
+DRIVER_PROMISES: list[Promise] = []
+_promise = partial(promise, DRIVER_PROMISES)
+_on_fake = partial(promise, DRIVER_PROMISES, offers=DriverWithFake)
 
 
 def run_driver_checks(name: str) -> list[Verdict]:
@@ -50,22 +46,7 @@ def run_driver_checks(name: str) -> list[Verdict]:
     `DependencyError` where a package that it needs, on its fake device too, is missing.
     """
     made = load(name, SENSORS)
-    return [driver_verdict(promise, made) for promise in DRIVER_PROMISES]
-
-
-def driver_verdict(promise: DriverPromise, made: type[Any]) -> Verdict:
-    """The verdict on one promise for one driver class; raises `DependencyError` for a package that is missing."""
-    if promise.plays and not hasattr(made, "fake"):
-        return Verdict(promise.id, promise.reason, Outcome.SKIPPED, "the driver ships no fake device: fake()")
-    try:
-        promise.test(made)
-    except ConformanceError as broken:
-        return Verdict(promise.id, promise.reason, Outcome.BROKEN, str(broken))
-    except DependencyError:
-        raise  # of the machine, not of the driver: no promise is broken
-    except Exception as error:  # noqa: BLE001 - a stranger's code may fail in any way; here that is an answer
-        return Verdict(promise.id, promise.reason, Outcome.BROKEN, f"it failed: {error!r}")
-    return Verdict(promise.id, promise.reason, Outcome.KEPT)
+    return [verdict(Check(one, made)) for one in DRIVER_PROMISES]
 
 
 @contextmanager
@@ -96,14 +77,14 @@ def _measured(output: Sequence[DriverOutput]) -> list[Any]:
     return [one for one in output if _is_measurement(one)]
 
 
-@_promise("describes_itself", "a list of drivers must not need their hardware", plays=False)
+@_promise("describes_itself", "a list of drivers must not need their hardware")
 def _describes_itself(made: type[Any]) -> None:
     require(isinstance(getattr(made, "summary", None), str), "it has no one-line summary")
     for method in ("discover", "open", "poll", "close"):
         require(callable(getattr(made, method, None)), f"it has no method {method}")
 
 
-@_promise("discovers_quietly", "looking for devices on any machine must end well", plays=False)
+@_promise("discovers_quietly", "looking for devices on any machine must end well")
 def _discovers_quietly(made: type[Any]) -> None:
     devices = made.discover()
     require(isinstance(devices, list), f"discover answered {devices!r}, not a list")
@@ -111,7 +92,7 @@ def _discovers_quietly(made: type[Any]) -> None:
     require(not strangers, f"discover found {strangers}, which are no Found")
 
 
-@_promise("refuses_settings", "a misspelt setting must not be ignored", plays=False)
+@_promise("refuses_settings", "a misspelt setting must not be ignored")
 def _refuses_settings(made: type[Any]) -> None:
     try:
         made(NAME, BootClock(), no_such_setting=1)
@@ -120,7 +101,7 @@ def _refuses_settings(made: type[Any]) -> None:
     raise ConformanceError("it took a setting named 'no_such_setting'")
 
 
-@_promise("has_a_spec", "the watchdog must know how long silence may last")
+@_on_fake("has_a_spec", "the watchdog must know how long silence may last")
 def _has_a_spec(made: type[Any]) -> None:
     with _playing(made) as (driver, _):
         spec = driver.spec
@@ -129,7 +110,7 @@ def _has_a_spec(made: type[Any]) -> None:
         require(spec.nominal_hz >= spec.least_hz >= 0.0, f"nominal {spec.nominal_hz} Hz, least {spec.least_hz} Hz")
 
 
-@_promise("opens_and_reports_its_device", "a log must state which device and which settings it came from")
+@_on_fake("opens_and_reports_its_device", "a log must state which device and which settings it came from")
 def _opens_and_reports_its_device(made: type[Any]) -> None:
     with _playing(made) as (driver, _):
         info = driver.open()
@@ -137,7 +118,7 @@ def _opens_and_reports_its_device(made: type[Any]) -> None:
         require(info.model, "open reports no model")
 
 
-@_promise("measures", "what the device sends must come out, under the sensor's name and of the kinds of its spec")
+@_on_fake("measures", "what the device sends must come out, under the sensor's name and of the kinds of its spec")
 def _measures(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
@@ -150,7 +131,7 @@ def _measures(made: type[Any]) -> None:
             require(isinstance(output, (*driver.spec.kinds, Diagnostic)), f"{output} is of no kind that its spec names")
 
 
-@_promise("stamps_honestly", "a stamp is when it was true: never in the future, never before the device was opened")
+@_on_fake("stamps_honestly", "a stamp is when it was true: never in the future, never before the device was opened")
 def _stamps_honestly(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         opened_ns = device.clock.now_ns()
@@ -163,7 +144,7 @@ def _stamps_honestly(made: type[Any]) -> None:
             require(early_s <= 0.0, f"{output} is stamped {early_s} s before the device was opened")
 
 
-@_promise("numbers_rise", "a gap in the numbers is how a lost message shows")
+@_on_fake("numbers_rise", "a gap in the numbers is how a lost message shows")
 def _numbers_rise(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
@@ -176,7 +157,7 @@ def _numbers_rise(made: type[Any]) -> None:
             require(numbers == sorted(set(numbers)), f"{kind.__name__} came with the numbers {numbers}")
 
 
-@_promise("waits_no_longer", "a poll that blocks keeps the robot from stopping")
+@_on_fake("waits_no_longer", "a poll that blocks keeps the robot from stopping")
 def _waits_no_longer(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
@@ -187,7 +168,7 @@ def _waits_no_longer(made: type[Any]) -> None:
         require(took_s <= POLL_S + LATE_S, f"a poll of {POLL_S} s took {took_s:.2f} s")
 
 
-@_promise("survives_garbage", "one bad line costs that line, and is reported")
+@_on_fake("survives_garbage", "one bad line costs that line, and is reported")
 def _survives_garbage(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
@@ -201,7 +182,7 @@ def _survives_garbage(made: type[Any]) -> None:
         require(_measured(_listen(driver, _is_measurement)), "after nonsense no measurement came any more")
 
 
-@_promise("reports_loss", "a device that is gone must not look like one that is silent")
+@_on_fake("reports_loss", "a device that is gone must not look like one that is silent")
 def _reports_loss(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
@@ -217,7 +198,7 @@ def _reports_loss(made: type[Any]) -> None:
         raise ConformanceError(f"the device was unplugged and {TRIES} polls raised no DeviceLostError")
 
 
-@_promise("refuses_absence", "a missing device is an error with a remedy, and leaves nothing half open")
+@_on_fake("refuses_absence", "a missing device is an error with a remedy, and leaves nothing half open")
 def _refuses_absence(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         device.unplug()
@@ -232,7 +213,7 @@ def _refuses_absence(made: type[Any]) -> None:
         raise ConformanceError("it opened a device that is not there")
 
 
-@_promise("comes_back", "a cable is pulled and put back: the same driver must go on")
+@_on_fake("comes_back", "a cable is pulled and put back: the same driver must go on")
 def _comes_back(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.open()
@@ -244,7 +225,7 @@ def _comes_back(made: type[Any]) -> None:
         require(_measured(_listen(driver, _is_measurement)), "opened again after a loss, it measures nothing")
 
 
-@_promise("closes_always", "whatever state it is in, letting go must work")
+@_on_fake("closes_always", "whatever state it is in, letting go must work")
 def _closes_always(made: type[Any]) -> None:
     with _playing(made) as (driver, device):
         driver.close()

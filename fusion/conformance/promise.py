@@ -1,4 +1,4 @@
-"""A promise of the contract of estimators: what must hold, why, and of whom it is asked."""
+"""A promise of a contract, of estimators or of drivers: what must hold, why, and of whom it is asked."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fusion.errors import ConformanceError
 from fusion.estimator import Tag
 
 Test: TypeAlias = Callable[[type[Any]], None]
-"""A search for a counter-example in an estimator class, which is built with the world alone."""
+"""A search for a counter-example in a class; an estimator is built with the world alone."""
 
 
 class Promise(NamedTuple):

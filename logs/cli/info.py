@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fusion import FusionError, Measurement, Ranges, WifiScan
+from fusion import FusionError, Measurement, Radio
 from fusion.plugins import left_out
 from fusion.values import seconds
 from logs.cli.info_text import info_text
@@ -91,7 +91,7 @@ def _describe_bag(path: Path) -> dict[str, Any]:
 
 def _anchors(run: Run) -> dict[str, Any]:
     """The anchors of the world, and the number of readings of each anchor, known or not."""
-    scans = (measurement for measurement in run.measurements if isinstance(measurement, WifiScan | Ranges))
+    scans = (measurement for measurement in run.measurements if isinstance(measurement, Radio))
     counts = Counter(reading.anchor for scan in scans for reading in scan.readings)
     known = [anchor.id for anchor in run.world.anchors]
     return {

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from fusion.cli.main import main
-from fusion.conformance.checks import Outcome
-from fusion.conformance.driver_promises import DRIVER_PROMISES, driver_verdict
+from fusion.conformance.checks import Check, Outcome, verdict
+from fusion.conformance.driver_promises import DRIVER_PROMISES
 from fusion.driver import DeviceInfo, DriverSpec
 from fusion.errors import DeviceLostError, NotPermittedError
 from fusion.values import WheelTicks
@@ -43,7 +43,10 @@ class Nameless(Good):
 
 class OtherName(Good):
     def poll(self, timeout_s):
-        return [replace(said, sensor="x") if isinstance(said, WheelTicks) else said for said in super().poll(timeout_s)]
+        return [
+            replace(output, sensor="x") if isinstance(output, WheelTicks) else output
+            for output in super().poll(timeout_s)
+        ]
 
 
 class Foretelling(Good):
@@ -126,16 +129,16 @@ SPOILT = {
 
 @pytest.mark.parametrize("promise", DRIVER_PROMISES, ids=lambda promise: promise.id)
 def test_each_promise_finds_a_driver_that_breaks_it(promise):
-    verdict = driver_verdict(promise, SPOILT[promise.id])
-    assert verdict.outcome is Outcome.BROKEN
-    assert verdict.detail
+    broken = verdict(Check(promise, SPOILT[promise.id]))
+    assert broken.outcome is Outcome.BROKEN
+    assert broken.detail
 
 
-def test_a_driver_without_a_fake_device_is_told_so():
+def test_promises_on_a_fake_device_are_skipped_for_a_driver_without_one():
     class Bare:
         summary = "bare"
 
-    outcomes = {promise.id: driver_verdict(promise, Bare).outcome for promise in DRIVER_PROMISES}
+    outcomes = {promise.id: verdict(Check(promise, Bare)).outcome for promise in DRIVER_PROMISES}
     assert outcomes["measures"] is Outcome.SKIPPED
     assert outcomes["discovers_quietly"] is Outcome.BROKEN
 
@@ -147,9 +150,9 @@ def test_the_command_checks_a_driver_by_name(capsys):
     assert "did you mean 'simulated_gyro'" in capsys.readouterr().err
 
 
-def test_driver_whose_package_is_missing_breaks_no_promise_and_says_so_once(monkeypatch, capsys):
+def test_driver_whose_package_is_missing_breaks_no_promise_and_is_reported_once(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "serialx", None)
     assert main(["check", "--driver", "uwb_qm33"]) == 1
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.startswith("fusion check: the package serialx is missing; python3 -m pip install")
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("fusion check: the package serialx is missing; python3 -m pip install")

@@ -3,13 +3,13 @@
 import pytest
 
 import fusion
-from fusion.conformance.checks import Outcome
-from fusion.conformance.driver_promises import DRIVER_PROMISES, driver_verdict
+from fusion.conformance.checks import Check, Outcome, verdict
+from fusion.conformance.driver_promises import DRIVER_PROMISES
 from fusion.plugins import SENSORS
 
 
 @pytest.mark.parametrize("promise", DRIVER_PROMISES, ids=lambda promise: promise.id)
 @pytest.mark.parametrize("name", fusion.names(SENSORS))
 def test_a_driver_keeps_its_promises(name, promise):
-    verdict = driver_verdict(promise, fusion.load(name, SENSORS))
-    assert verdict.outcome is Outcome.KEPT, verdict.detail
+    kept = verdict(Check(promise, fusion.load(name, SENSORS)))
+    assert kept.outcome is Outcome.KEPT, kept.detail

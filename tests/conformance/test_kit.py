@@ -29,7 +29,7 @@ from fusion import (
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.cli import check as verb
 from fusion.cli.main import main
-from fusion.conformance.checks import PROMISES, Check, Outcome, _verdict, checks, run_checks
+from fusion.conformance.checks import PROMISES, Check, Outcome, checks, run_checks, verdict
 
 
 class State(NamedTuple):
@@ -189,9 +189,9 @@ class NeedsWifi(Correct):
         return super().start(prior, prior.time_ns)
 
     def see(self, state, scan):
-        heard = state.seed if isinstance(scan, Ranges) else scan.time_ns
+        number = state.seed if isinstance(scan, Ranges) else scan.time_ns
         after, fates = super().see(state, scan)
-        return after._replace(seed=heard), fates
+        return after._replace(seed=number), fates
 
     def estimate(self, state, motion, time_ns):
         found = super().estimate(state, motion, time_ns)
@@ -399,7 +399,7 @@ def test_every_promise_has_an_estimator_that_breaks_it():
     assert {promise.id for promise in PROMISES} == set(BROKEN.values())
 
 
-def test_ids_are_unique_and_every_promise_says_why():
+def test_ids_are_unique_and_every_promise_states_its_reason():
     assert len({promise.id for promise in PROMISES}) == len(PROMISES)
     assert all(promise.reason.endswith(".") for promise in PROMISES)
 
@@ -407,10 +407,10 @@ def test_ids_are_unique_and_every_promise_says_why():
 def verdict_on(estimator, promise_id, excuse=None):
     """What `run_checks` makes of one promise, without the others."""
     (promise,) = (promise for promise in PROMISES if promise.id == promise_id)
-    return _verdict(Check(promise, estimator), excuse)
+    return verdict(Check(promise, estimator), excuse)
 
 
-def test_verdicts_tell_broken_excused_and_skipped_apart():
+def test_verdicts_distinguish_broken_excused_and_skipped():
     broken = verdict_on(NoGate, "outlier-is-bounded")
     excused = verdict_on(NoGate, "outlier-is-bounded", "it has no gate")
     skipped = verdict_on(type("Quiet", (Correct,), {"tags": {Tag.NO_RADIO}}), "outlier-is-bounded")
@@ -454,7 +454,7 @@ def test_estimator_that_raises_is_a_verdict_not_a_traceback():
 
 
 @pytest.mark.parametrize(("estimator", "code"), [(Correct, 0), (HeavyWeight, 1)])
-def test_verb_tells_a_line_for_each_promise_and_exits_by_the_result(estimator, code, monkeypatch, capsys):
+def test_verb_prints_a_line_for_each_promise_and_exits_by_the_result(estimator, code, monkeypatch, capsys):
     with registered("held", estimator):
         verdicts = run_checks("held")
         monkeypatch.setattr(verb, "run_checks", {"held": verdicts}.__getitem__)

@@ -1,6 +1,7 @@
-"""One estimator stepped by hand, its state in sight."""
+"""One estimator stepped by hand, its state in sight; and a fold over radio, from a start that is roughly known."""
 
-from fusion import Increment, Odometry, OdometryNoise
+from fusion import Covariance, Increment, Odometry, OdometryNoise, Prior, track
+from tests.worlds import START
 
 NOISE = OdometryNoise()
 
@@ -35,3 +36,12 @@ class Stepped:
         self.state, fates = self.estimator.step(self.state, self.motion, scan)
         self.motion = Increment(time_ns=time_ns)
         return fates
+
+
+def prior(pose=START, **known):
+    return Prior(0, pose, Covariance.from_std(0.3, 0.3, 0.2), **known)
+
+
+def radio_updates(estimator, place, measurements, start, seed=0):
+    """The updates by scans."""
+    return [update for update in track(estimator, place, measurements, start, seed=seed) if update.fates]

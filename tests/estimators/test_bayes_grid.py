@@ -7,20 +7,10 @@ import pytest
 
 from estimators.bayes_grid import BayesGrid, floor_kernel, turn_kernel
 from estimators.ekf import Ekf
-from fusion import (
-    Covariance,
-    Decision,
-    Odometry,
-    ParameterError,
-    Pose,
-    Prior,
-    RangeReading,
-    Ranges,
-    World,
-    digest,
-    track,
-)
+from fusion import Covariance, Decision, Odometry, ParameterError, Pose, Prior, RangeReading, Ranges, digest
 from fusion.values import NANOSECONDS as SECOND
+from tests.estimators.stepping import prior, radio_updates
+from tests.worlds import circle, ranged_world
 
 PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (0.5, 8.0), "d": (8.0, 7.0)}
 START = Pose(3.0, 1.5, 0.2)
@@ -28,42 +18,20 @@ STILL = Pose(0.0, 0.0, 0.0)
 
 
 def world(map_from_room=STILL, side_m=8.0):
-    anchors = [{"id": name, "position_m": list(map_from_room.transform(*at))} for name, at in PLACES.items()]
     corners = np.array([map_from_room.transform(x, y) for x in (-1.0, side_m + 1.0) for y in (-1.0, side_m + 1.0)])
     (x_min, y_min), (x_max, y_max) = corners.min(axis=0), corners.max(axis=0)
     bounds = {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}
-    ranging = {"std_m": 0.2, "bias_std_m": 0.0, "scale_std": 0.0}
-    return World.from_table({"anchors": anchors, "bounds": bounds, "ranging": ranging})
+    return ranged_world({name: map_from_room.transform(*at) for name, at in PLACES.items()}, bounds=bounds)
 
 
-def drive(seconds=20, outlier_at=None):
-    """A circle: odometry at 10 Hz, all four ranges at 2 Hz."""
-    random, pose, measurements, truth = np.random.default_rng(3), START, [], []
-    for k in range(1, seconds * 10 + 1):
-        t = k * SECOND // 10
-        middle = pose.heading + 0.01
-        pose = Pose(pose.x + 0.05 * math.cos(middle), pose.y + 0.05 * math.sin(middle), pose.heading + 0.02)
-        measurements.append(Odometry(t, "w", k, t - SECOND // 10, 0.05, 0.02))
-        if k % 5 == 0:
-            far = {n: math.hypot(pose.x - x, pose.y - y) + random.normal(0, 0.2) for n, (x, y) in PLACES.items()}
-            far["a"] += 30.0 if k == outlier_at else 0.0
-            measurements.append(Ranges(t, "uwb", k, tuple(RangeReading(n, z) for n, z in far.items())))
-            truth.append(pose)
-    return measurements, truth
-
-
-def prior(pose=START, **known):
-    return Prior(0, pose, Covariance.from_std(0.3, 0.3, 0.2), **known)
-
-
-def radio_updates(estimator, place, measurements, start):
-    return [u for u in track(estimator, place, measurements, start) if u.fates]
+def drive(**options):
+    return circle(start=START, turn_rad=0.02, places=PLACES, **options)
 
 
 def test_grid_agrees_with_the_extended_kalman_filter_within_a_cell():
     measurements, _ = drive()
-    ours = radio_updates(BayesGrid(world()), world(), measurements, prior())
-    theirs = radio_updates(Ekf(world()), world(), measurements, prior())
+    ours = radio_updates(BayesGrid(world()), world(), measurements, prior(START))
+    theirs = radio_updates(Ekf(world()), world(), measurements, prior(START))
     apart = [math.dist(a.estimate.pose[:2], b.estimate.pose[:2]) for a, b in zip(ours, theirs, strict=True)]
     assert np.sqrt(np.mean(np.square(apart))) < 0.15
     assert max(apart) < 0.35
@@ -72,7 +40,7 @@ def test_grid_agrees_with_the_extended_kalman_filter_within_a_cell():
 @pytest.mark.parametrize("known", [{"heading_known": False}, {"heading_known": False, "position_known": False}])
 def test_unknown_start_is_found_by_driving(known):
     measurements, truth = drive(seconds=30)
-    updates = radio_updates(BayesGrid(world()), world(), measurements, prior(**known))
+    updates = radio_updates(BayesGrid(world()), world(), measurements, prior(START, **known))
     assert not updates[0].estimate.heading_known
     last = updates[-1].estimate
     assert last.heading_known
@@ -82,7 +50,7 @@ def test_unknown_start_is_found_by_driving(known):
 
 def test_turning_and_shifting_the_world_turns_and_shifts_the_answer_within_a_cell():
     measurements, _ = drive()
-    plain = radio_updates(BayesGrid(world()), world(), measurements, prior())
+    plain = radio_updates(BayesGrid(world()), world(), measurements, prior(START))
     turned = Pose(-3.0, 5.0, 2.2)
     place = world(turned)
     answers = radio_updates(BayesGrid(place), place, measurements, prior(turned.compose(START)))
@@ -92,20 +60,20 @@ def test_turning_and_shifting_the_world_turns_and_shifts_the_answer_within_a_cel
 
 def test_same_input_gives_the_same_bytes():
     measurements, _ = drive(seconds=5)
-    one, two = (digest(radio_updates(BayesGrid(world()), world(), measurements, prior())) for _ in range(2))
+    one, two = (digest(radio_updates(BayesGrid(world()), world(), measurements, prior(START))) for _ in range(2))
     assert one == two
 
 
 def test_an_absurd_range_is_doubted_and_moves_the_belief_little():
     measurements, truth = drive(outlier_at=150)
-    update = radio_updates(BayesGrid(world()), world(), measurements, prior())[29]
+    update = radio_updates(BayesGrid(world()), world(), measurements, prior(START))[29]
     assert update.fates[0].decision is Decision.DOWNWEIGHTED
     assert update.fates[0].innovation == pytest.approx(30.0, abs=1.0)
     assert math.dist(update.estimate.pose[:2], truth[29][:2]) < 0.4
 
 
 def test_motion_below_a_cell_is_not_lost():
-    """Creeping 2 cm between far readings that say nothing: the belief arrives where odometry says."""
+    """Creeping 2 cm between far readings without information: the belief arrives where odometry does."""
     place, measurements = world(), []
     for k in range(1, 101):
         reading = Ranges(k * SECOND, "uwb", k, (RangeReading("a", 5.0, 1e6),))
@@ -117,7 +85,7 @@ def test_motion_below_a_cell_is_not_lost():
 
 
 def test_memory_is_bounded_whatever_the_floor():
-    sizes = [BayesGrid(world(side_m=side)).start(prior(), 0).histogram.size for side in (8.0, 80.0)]
+    sizes = [BayesGrid(world(side_m=side)).start(prior(START), 0).histogram.size for side in (8.0, 80.0)]
     assert max(sizes) < 1.2 * 1600 * 24
     assert max(sizes) < 1.2 * min(sizes)
 
@@ -149,7 +117,7 @@ def test_impossible_options_are_refused(options):
 
 def test_particles_are_the_cells_with_their_probabilities():
     grid, place = BayesGrid(world()), world()
-    state = grid.start(prior(), 0)
+    state = grid.start(prior(START), 0)
     shown = grid.particles(state)
     assert shown.weights.sum() == pytest.approx(1.0)
     assert shown.weights @ shown.positions == pytest.approx(state.pose[:2], abs=1e-9)

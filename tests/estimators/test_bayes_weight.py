@@ -8,25 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimators.bayes_weight import BayesWeight
-from fusion import (
-    Covariance,
-    Decision,
-    Odometry,
-    ParameterError,
-    Pose,
-    Prior,
-    RangeReading,
-    Ranges,
-    Reason,
-    World,
-    final,
-    track,
-)
+from fusion import Covariance, Decision, Odometry, ParameterError, Pose, Prior, Ranges, Reason, final, track
 from fusion.trilateration import Fix
 from fusion.values import NANOSECONDS as SECOND
 from tests.estimators.stepping import Stepped
+from tests.worlds import PLACES, exact_ranges, ranged_world
 
-PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0), "d": (9.0, 7.0)}
 AREA = 30.0 * 40.0
 ARM = (0.4, -0.2, 0.0)
 BELIEF = Pose(4.0, 3.0, 0.7)
@@ -34,22 +21,17 @@ SPREAD = Covariance(0.09, 0.02, -0.01, 0.16, 0.03, 0.04)
 FIX = Fix(4.9, 2.6, 0.05, 0.01, 0.03)
 
 
+BOUNDS = {"x_min": -10.0, "x_max": 20.0, "y_min": -15.0, "y_max": 25.0}
+
+
 def world(places=PLACES, arm=(0.0, 0.0, 0.0), bias_std_m=0.0):
-    anchors = [{"id": name, "position_m": list(place)} for name, place in places.items()]
-    return World.from_table(
-        {
-            "anchors": anchors,
-            "bounds": {"x_min": -10.0, "x_max": 20.0, "y_min": -15.0, "y_max": 25.0},
-            "ranging": {"std_m": 0.1, "bias_std_m": bias_std_m, "scale_std": 0.0},
-            "robot": {"antenna_m": list(arm)},
-        }
-    )
+    ranging = {"std_m": 0.1, "bias_std_m": bias_std_m}
+    return ranged_world(places, ranging=ranging, bounds=BOUNDS, robot={"antenna_m": list(arm)})
 
 
-def scan(k, x, y, heard=tuple(PLACES), places=PLACES):
+def scan(k, x, y, names=None):
     """Exact ranges from (x, y), k tenths of a second after the start."""
-    readings = tuple(RangeReading(n, math.dist((x, y), places[n])) for n in heard)
-    return Ranges(k * SECOND // 10, "uwb", k, readings)
+    return exact_ranges(k * SECOND // 10, k, (x, y), names)
 
 
 def drive(seconds=30, std=0.1, seed=4, outlier_at=()):
@@ -160,7 +142,7 @@ def test_outliers_are_refused_on_the_way_and_the_track_stays():
 
 
 def test_heading_is_corrected_through_its_covariance_with_the_position():
-    """After 5 m straight ahead a fix to the left says that the heading was too far right."""
+    """After 5 m straight ahead a fix to the left shows that the heading was too far right."""
     robot = Stepped(BayesWeight(world()), Prior(0, Pose(0.0, 3.0, 0.0), Covariance.from_std(0.05, 0.05, 0.2)))
     robot.feed(Odometry(SECOND, "wheels", 1, 0, 5.0, 0.0))
     before = robot.estimate(SECOND)

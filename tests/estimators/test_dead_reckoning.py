@@ -8,21 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimators.dead_reckoning import DeadReckoning
-from fusion import (
-    Covariance,
-    Decision,
-    Increment,
-    Odometry,
-    Pose,
-    Prior,
-    RangeReading,
-    Ranges,
-    Reason,
-    World,
-    compose,
-)
+from fusion import Covariance, Decision, Increment, Odometry, Pose, Prior, RangeReading, Ranges, Reason, compose
 from fusion.values import NANOSECONDS as SECOND
 from tests.estimators.stepping import Stepped
+from tests.worlds import empty_world
 
 EXACT = dict.fromkeys(
     (
@@ -43,7 +32,7 @@ CURVES = [(0.5, 0.1)] * 20 + [(0.4, -0.15)] * 30
 
 
 def world(**noise):
-    return World.from_table({"bounds": {"x_min": 0, "x_max": 9, "y_min": 0, "y_max": 9}, "robot": {"noise": noise}})
+    return empty_world(robot={"noise": noise})
 
 
 def exact(**noise):
@@ -122,7 +111,7 @@ def test_radio_is_unusable_and_changes_nothing():
     assert {(f.decision, f.reason, f.weight) for f in fates} == {(Decision.UNUSABLE, Reason.KIND_NOT_CONSUMED, 0.0)}
 
 
-def test_unknown_start_is_said_and_gives_no_nan():
+def test_unknown_start_is_reported_and_gives_no_nan():
     nowhere = Pose(math.nan, math.nan, math.nan)
     estimate = driven(world(), CURVES, nowhere, position_known=False, heading_known=False)
     assert not estimate.valid
@@ -130,7 +119,7 @@ def test_unknown_start_is_said_and_gives_no_nan():
     assert np.isfinite([*estimate.pose, *estimate.covariance]).all()
 
 
-def test_known_position_with_unknown_heading_is_valid_and_says_so():
+def test_known_position_with_unknown_heading_is_valid_and_reports_the_heading():
     estimate = driven(world(), [], Pose(1.0, 1.0, 2.0), heading_known=False)
     assert estimate.valid
     assert not estimate.heading_known

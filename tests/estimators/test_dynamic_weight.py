@@ -6,22 +6,10 @@ import numpy as np
 import pytest
 
 from estimators.dynamic_weight import DynamicWeight, allocate, weighted_average
-from fusion import (
-    Covariance,
-    Decision,
-    Odometry,
-    ParameterError,
-    Pose,
-    Prior,
-    RangeReading,
-    Ranges,
-    Reason,
-    RssiReading,
-    WifiScan,
-    World,
-)
+from fusion import Covariance, Decision, Odometry, ParameterError, Pose, Prior, Reason, RssiReading, WifiScan, World
 from fusion.values import NANOSECONDS as SECOND
 from tests.estimators.stepping import Stepped
+from tests.worlds import anchored_world, exact_ranges
 
 PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0)}
 START = Pose(4.0, 3.0, 0.0)
@@ -32,10 +20,9 @@ BAD = (6.0, 3.0)
 
 def world(places=PLACES, robot=None, corner=(0.0, 0.0)):
     """A floor of 30 m by 40 m: its diagonal is 50 m."""
-    anchors = [{"id": name, "position_m": list(place)} for name, place in places.items()]
     x, y = corner
     bounds = {"x_min": x, "x_max": x + 30.0, "y_min": y, "y_max": y + 40.0}
-    return World.from_table({"anchors": anchors, "bounds": bounds, "robot": robot or {}})
+    return anchored_world(places, bounds=bounds, robot=robot or {})
 
 
 class Robot:
@@ -46,11 +33,10 @@ class Robot:
         self.stepped = Stepped(DynamicWeight(place or world(places), **options), prior)
         self.places, self.k = places, 0
 
-    def scan(self, x, y, heard="abc"):
+    def scan(self, x, y, names="abc"):
         """Exact ranges from (x, y); answers the Fates."""
         self.k += 1
-        readings = tuple(RangeReading(n, math.dist((x, y), self.places[n])) for n in heard)
-        return self.stepped.feed(Ranges(self.k * SECOND, "uwb", self.k, readings))
+        return self.stepped.feed(exact_ranges(self.k * SECOND, self.k, (x, y), names, self.places))
 
     def drive(self, distance, turn=0.0):
         self.k += 1
@@ -105,8 +91,8 @@ def test_algorithm_1_line_4_trilaterates_signal_strengths():
     anchors = [{"id": name, "position_m": list(at)} for name, at in PLACES.items()]
     radio = {"reference_rssi_dbm": -40.0, "path_loss_exponent": 2.0}
     robot = Robot(World.from_table({"anchors": anchors, "radio": radio}), Pose(4.2, 2.8, 0.0))
-    heard = {"a": -53.979400, "b": -53.979400, "c": -52.552725}
-    robot.stepped.feed(WifiScan(SECOND, "wifi", 1, tuple(RssiReading(name, dbm) for name, dbm in heard.items())))
+    strengths = {"a": -53.979400, "b": -53.979400, "c": -52.552725}
+    robot.stepped.feed(WifiScan(SECOND, "wifi", 1, tuple(RssiReading(name, dbm) for name, dbm in strengths.items())))
     assert robot.position == pytest.approx((4.1, 2.9), abs=1e-5)
 
 
@@ -205,7 +191,7 @@ def test_feedback_decides_where_an_odometry_step_starts(feedback, expected):
 @pytest.mark.parametrize(("missing", "weight"), [("ignore", 0.5), ("count", 0.75)])
 def test_missing_wifi_leaves_the_counter_or_raises_it(missing, weight):
     robot = Robot(missing_wifi=missing, epsilon=1, window_s=0.5)
-    fates = robot.scan(*GOOD, heard="ab")
+    fates = robot.scan(*GOOD, names="ab")
     assert {(f.decision, f.reason, f.weight) for f in fates} == {(Decision.UNUSABLE, Reason.TOO_FEW_ANCHORS, 0.0)}
     assert robot.position == START[:2]
     assert robot.scan(*GOOD)[0].weight == weight
@@ -213,7 +199,7 @@ def test_missing_wifi_leaves_the_counter_or_raises_it(missing, weight):
 
 def test_each_reading_is_used_once():
     robot = Robot(window_s=10.0)
-    reasons = [robot.scan(*GOOD, heard=name)[0].reason for name in "abccab"]
+    reasons = [robot.scan(*GOOD, names=name)[0].reason for name in "abccab"]
     too_few = [Reason.TOO_FEW_ANCHORS] * 2
     assert reasons == [*too_few, Reason.OK, *too_few, Reason.OK]
 
@@ -249,7 +235,7 @@ def test_weakness_of_the_literal_readings_the_origin_decides_what_an_outlier_is(
 
 
 def test_weakness_odometry_that_drifted_too_far_locks_good_fixes_out_for_ever():
-    """Told to be at (6, 3) but standing at (4, 3): every exact fix is an outlier, whatever the counter says."""
+    """Believed at (6, 3) but standing at (4, 3): every exact fix is an outlier, whatever the counter."""
     robot = Robot(start=Pose(6.0, 3.0, 0.0))
     decisions = {robot.scan(4.0, 3.0)[0].decision for _ in range(20)}
     assert decisions == {Decision.REJECTED}

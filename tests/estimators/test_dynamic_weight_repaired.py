@@ -7,31 +7,22 @@ import pytest
 
 from estimators.dynamic_weight import DynamicWeight
 from estimators.dynamic_weight_repaired import DynamicWeightRepaired, State, average
-from fusion import (
-    Covariance,
-    Decision,
-    Increment,
-    Odometry,
-    ParameterError,
-    Pose,
-    Prior,
-    RangeReading,
-    Ranges,
-    Reason,
-    World,
-)
+from fusion import Covariance, Decision, Increment, Odometry, ParameterError, Pose, Prior, Reason
 from fusion.trilateration import Fix
 from fusion.values import NANOSECONDS as SECOND
 from tests.estimators.stepping import Stepped
+from tests.worlds import PLACES, exact_ranges, ranged_world
 
-PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0)}
 START = Pose(4.0, 3.0, 0.0)
 
 
 def world(arm=(0.0, 0.0, 0.0), std_m=0.1):
-    anchors = [{"id": name, "position_m": list(place)} for name, place in PLACES.items()]
-    ranging = {"std_m": std_m, "bias_std_m": 0.0, "scale_std": 0.0}
-    return World.from_table({"anchors": anchors, "ranging": ranging, "robot": {"antenna_m": list(arm)}})
+    places = {name: PLACES[name] for name in "abc"}
+    return ranged_world(places, ranging={"std_m": std_m}, robot={"antenna_m": list(arm)})
+
+
+def scan(k, x, y, names="abc"):
+    return exact_ranges(k * SECOND, k, (x, y), names)
 
 
 def believing(counter=0, std=0.3, known=True):
@@ -43,10 +34,6 @@ def weigh(away, counter=0, known=True, **options):
     """A fix so far along x, 0.4 m per axis: S = 0.09 + 0.16 = 0.25, NIS = away^2 / 0.25."""
     state, fix = believing(counter, known=known), Fix(away, 0.0, 0.16, 0.0, 0.16)
     return DynamicWeightRepaired(world(), **options).weigh(state, state.pose, state.covariance, fix)
-
-
-def scan(k, x, y, heard="abc"):
-    return Ranges(k * SECOND, "uwb", k, tuple(RangeReading(n, math.dist((x, y), PLACES[n])) for n in heard))
 
 
 def fed(estimator, measurements, start=START, std=0.1, **known):
@@ -73,7 +60,7 @@ def test_gate_and_weights_worked_out_by_hand(away, counter, expected):
     assert weigh(away, counter) == expected
 
 
-def test_gate_passes_the_share_of_good_fixes_it_says():
+def test_gate_passes_its_share_of_good_fixes():
     """4000 fixes drawn as the covariances claim, gate at 90 %: 0.9 within four standard deviations of a binomial."""
     random = np.random.default_rng(5)
     estimator, state = DynamicWeightRepaired(world(), gate_probability=0.9), believing()
@@ -123,7 +110,7 @@ def test_lock_out_is_cured_by_the_widening_gate_and_by_nothing_else(away):
     assert math.dist(robot.state.pose[:2], (4.0, 3.0)) < 0.01
     for stubborn in (DynamicWeightRepaired(world(), widening=0.0), DynamicWeight(world())):
         stuck, fates = fed(stubborn, fixes, start)
-        assert {f.decision for said in fates for f in said} == {Decision.REJECTED}
+        assert {f.decision for each in fates for f in each} == {Decision.REJECTED}
         assert math.dist(stuck.estimate(40 * SECOND).pose[:2], (4.0, 3.0)) == pytest.approx(away)
 
 
@@ -137,7 +124,7 @@ def test_unknown_position_believes_the_first_fix_whole():
 
 def test_two_anchors_give_no_fix_and_motion_goes_on():
     step = Odometry(SECOND, "wheels", 1, 0, 0.5, 0.0)
-    robot, (_, fates) = fed(DynamicWeightRepaired(world()), [step, scan(2, 4.5, 3.0, heard="ab")])
+    robot, (_, fates) = fed(DynamicWeightRepaired(world()), [step, scan(2, 4.5, 3.0, names="ab")])
     assert {f.reason for f in fates} == {Reason.TOO_FEW_ANCHORS}
     assert robot.estimate(2 * SECOND).pose[:2] == pytest.approx((4.5, 3.0))
 

@@ -17,28 +17,24 @@ from fusion import (
     Prior,
     RangeReading,
     Ranges,
-    World,
     final,
     track,
     wrap_angle,
 )
 from fusion.fates import chi_square_gate
-
-SECOND = 1_000_000_000
-PLAIN_NOISE = {"distance_scale_std": 0.0, "turn_scale_std": 0.0, "turn_bias_std_rad_s": 0.0}
-PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0), "d": (9.0, 7.0)}
+from fusion.values import NANOSECONDS as SECOND
+from tests.estimators.stepping import prior
+from tests.worlds import PLACES, PLAIN_NOISE, START, ranged_world
 
 
 def world(noise=PLAIN_NOISE, places=PLACES, **ranging):
-    anchors = [{"id": name, "position_m": list(place)} for name, place in places.items()]
-    plain = {"std_m": 0.2, "bias_std_m": 0.0, "scale_std": 0.0}
-    return World.from_table({"anchors": anchors, "robot": {"noise": noise}, "ranging": {**plain, **ranging}})
+    return ranged_world(places, ranging=ranging, robot={"noise": noise})
 
 
 def drive(places=PLACES, turned=Pose(0.0, 0.0, 0.0), seconds=20, seed=3, bias=None, outlier_at=None):
     """A circle with noisy odometry at 10 Hz and one range a tenth of a second, anchors in turn."""
     random = np.random.default_rng(seed)
-    pose, measurements, truth = Pose(4.0, 1.0, 0.2), [], []
+    pose, measurements, truth = START, [], []
     for k in range(1, seconds * 10 + 1):
         distance, turn = 0.05, 0.015
         middle = pose.heading + turn / 2
@@ -53,10 +49,6 @@ def drive(places=PLACES, turned=Pose(0.0, 0.0, 0.0), seconds=20, seed=3, bias=No
         measurements.append(Ranges(t, "uwb", k, (RangeReading(name, far),)))
         truth.append((x, y))
     return measurements, np.array(truth)
-
-
-def prior(pose=Pose(4.0, 1.0, 0.2), **known):
-    return Prior(0, pose, Covariance.from_std(0.3, 0.3, 0.2), **known)
 
 
 def positions(updates):

@@ -15,50 +15,25 @@ from fusion import (
     Prior,
     RangeReading,
     Ranges,
-    World,
     build,
     digest,
     track,
 )
 from fusion.values import NANOSECONDS as SECOND
+from tests.estimators.stepping import prior, radio_updates
+from tests.worlds import PLACES, PLAIN_NOISE, START, circle, ranged_world
 
 pytest.importorskip("filterpy.kalman")
+ARM = (0.1, 0.05)
 BOTH = pytest.mark.parametrize("name", ["filterpy_ekf", "filterpy_ukf"])
-PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0), "d": (9.0, 7.0)}
-PLAIN_NOISE = {"distance_scale_std": 0.0, "turn_scale_std": 0.0, "turn_bias_std_rad_s": 0.0}
-START = Pose(4.0, 1.0, 0.2)
 
 
-def world(noise=PLAIN_NOISE, places=PLACES, antenna_m=(0.1, 0.05, 0.0), bias_std_m=0.1):
-    anchors = [{"id": name, "position_m": list(place)} for name, place in places.items()]
-    robot = {"noise": noise, "antenna_m": list(antenna_m)}
-    ranging = {"std_m": 0.2, "bias_std_m": bias_std_m, "scale_std": 0.0}
-    return World.from_table({"anchors": anchors, "robot": robot, "ranging": ranging})
+def world(noise=PLAIN_NOISE, places=PLACES, arm=ARM, bias_std_m=0.1):
+    return ranged_world(places, ranging={"bias_std_m": bias_std_m}, robot={"noise": noise, "antenna_m": [*arm, 0.0]})
 
 
-def drive(seconds=20, std=0.2, outlier_at=None, map_from_room=Pose(0.0, 0.0, 0.0)):
-    """A circle: odometry at 10 Hz, all four ranges to the antenna at 2 Hz."""
-    random, pose, measurements, truth = np.random.default_rng(3), START, [], []
-    for k in range(1, seconds * 10 + 1):
-        t = k * SECOND // 10
-        middle = pose.heading + 0.0075
-        pose = Pose(pose.x + 0.05 * math.cos(middle), pose.y + 0.05 * math.sin(middle), pose.heading + 0.015)
-        measurements.append(Odometry(t, "w", k, t - SECOND // 10, 0.05, 0.015))
-        if k % 5 == 0:
-            at = pose.transform(0.1, 0.05)
-            far = {n: math.dist(at, place) + random.normal(0, std) for n, place in PLACES.items()}
-            far["a"] += 30.0 if k == outlier_at else 0.0
-            measurements.append(Ranges(t, "uwb", k, tuple(RangeReading(n, z) for n, z in far.items())))
-            truth.append(map_from_room.compose(pose))
-    return measurements, truth
-
-
-def prior(pose=START, **known):
-    return Prior(0, pose, Covariance.from_std(0.3, 0.3, 0.2), **known)
-
-
-def radio_updates(estimator, place, measurements, start):
-    return [u for u in track(estimator, place, measurements, start) if u.fates]
+def drive(**options):
+    return circle(arm=ARM, **options)
 
 
 def test_extended_filter_equals_ours_to_1e_9():
@@ -78,7 +53,7 @@ def test_filter_on_a_linear_problem_is_the_kalman_filter(name):
     """Driving straight at an anchor on the x axis, the range is linear in x: compare with the scalar Kalman filter."""
     places = {"a": (1000.0, 0.0), "b": (0.0, 900.0), "c": (-500.0, -500.0)}
     still = {"turn_std_per_sqrt_m": 0.0, "turn_std_per_sqrt_s": 0.0, "side_std_per_sqrt_m": 0.0}
-    place = world({**PLAIN_NOISE, **still}, places, (0.0, 0.0, 0.0))
+    place = world({**PLAIN_NOISE, **still}, places, (0.0, 0.0))
     start = Prior(0, Pose(0.0, 0.0, 0.0), Covariance(0.5, 0.0, 0.0, 0.0, 0.0, 0.0))
     mean, variance, measurements, expected = 0.0, 0.5, [], []
     for k in range(1, 40):
@@ -95,7 +70,7 @@ def test_filter_on_a_linear_problem_is_the_kalman_filter(name):
 
 @BOTH
 def test_noiseless_data_lead_to_the_truth(name):
-    measurements, truth = drive(std=0.0)
+    measurements, truth = drive(std_m=0.0)
     last = radio_updates(build(name, world()), world(), measurements, prior())[-1].estimate
     assert math.dist(last.pose[:2], truth[-1][:2]) < 0.01
 

@@ -7,79 +7,33 @@ import pytest
 
 from estimators.ekf import Ekf
 from estimators.particle import HEADING, Particle, moved, resampled
-from fusion import (
-    Covariance,
-    Decision,
-    Increment,
-    Odometry,
-    OdometryNoise,
-    ParameterError,
-    Pose,
-    Prior,
-    RangeReading,
-    Ranges,
-    World,
-    compose,
-    digest,
-    track,
-)
+from fusion import Covariance, Decision, Increment, Odometry, ParameterError, Pose, compose, digest
 from fusion.values import NANOSECONDS as SECOND
-from tests.estimators.stepping import Stepped
+from tests.estimators.stepping import NOISE, Stepped, prior, radio_updates
+from tests.worlds import circle, ranged_world
 
-PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0), "d": (9.0, 7.0)}
-START = Pose(4.0, 1.0, 0.2)
-
-
-def world():
-    anchors = [{"id": name, "position_m": list(place)} for name, place in PLACES.items()]
-    return World.from_table({"anchors": anchors, "ranging": {"std_m": 0.2, "bias_std_m": 0.0, "scale_std": 0.0}})
-
-
-def drive(seconds=20, std=0.2, outlier_at=None):
-    """A circle of 3.3 m radius: odometry at 10 Hz, all four ranges at 2 Hz."""
-    random, pose, measurements, truth = np.random.default_rng(3), START, [], []
-    for k in range(1, seconds * 10 + 1):
-        t = k * SECOND // 10
-        pose = pose.compose(Increment().extend(Odometry(t, "w", k, t - SECOND // 10, 0.05, 0.015), NOISE).pose)
-        measurements.append(Odometry(t, "w", k, t - SECOND // 10, 0.05, 0.015))
-        if k % 5 == 0:
-            far = {n: math.hypot(pose.x - x, pose.y - y) + random.normal(0, std) for n, (x, y) in PLACES.items()}
-            far["a"] += 30.0 if k == outlier_at else 0.0
-            measurements.append(Ranges(t, "uwb", k, tuple(RangeReading(n, z) for n, z in far.items())))
-            truth.append(pose)
-    return measurements, truth
-
-
-NOISE = OdometryNoise()
-
-
-def prior(**known):
-    return Prior(0, START, Covariance.from_std(0.3, 0.3, 0.2), **known)
-
-
-def radio_updates(estimator, measurements, start, seed=0):
-    return [u for u in track(estimator, world(), measurements, start, seed=seed) if u.fates]
+WORLD = ranged_world()
 
 
 def test_cloud_agrees_with_the_extended_kalman_filter_on_an_easy_world():
-    measurements, _ = drive()
-    ours = radio_updates(Particle(world()), measurements, prior())
-    theirs = radio_updates(Ekf(world()), measurements, prior())
+    measurements, _ = circle()
+    ours = radio_updates(Particle(WORLD), WORLD, measurements, prior())
+    theirs = radio_updates(Ekf(WORLD), WORLD, measurements, prior())
     apart = [math.dist(a.estimate.pose[:2], b.estimate.pose[:2]) for a, b in zip(ours, theirs, strict=True)]
     assert np.sqrt(np.mean(np.square(apart))) < 0.06
     assert ours[-1].estimate.covariance.xx == pytest.approx(theirs[-1].estimate.covariance.xx, rel=0.5)
 
 
 def test_noiseless_data_lead_to_the_truth():
-    measurements, truth = drive(std=0.0)
-    last = radio_updates(Particle(world()), measurements, prior())[-1].estimate
+    measurements, truth = circle(std_m=0.0)
+    last = radio_updates(Particle(WORLD), WORLD, measurements, prior())[-1].estimate
     assert math.dist(last.pose[:2], truth[-1][:2]) < 0.05
 
 
 @pytest.mark.parametrize("known", [{"heading_known": False}, {"heading_known": False, "position_known": False}])
 def test_unknown_start_is_found_by_driving(known):
-    measurements, truth = drive(seconds=30)
-    updates = radio_updates(Particle(world()), measurements, prior(**known))
+    measurements, truth = circle(seconds=30)
+    updates = radio_updates(Particle(WORLD), WORLD, measurements, prior(**known))
     assert not updates[0].estimate.heading_known
     last = updates[-1].estimate
     assert last.heading_known
@@ -88,14 +42,15 @@ def test_unknown_start_is_found_by_driving(known):
 
 
 def test_same_seed_gives_the_same_bytes_and_another_seed_others():
-    measurements, _ = drive(seconds=5)
-    one, same, other = (digest(radio_updates(Particle(world()), measurements, prior(), seed)) for seed in (1, 1, 2))
+    measurements, _ = circle(seconds=5)
+    runs = (radio_updates(Particle(WORLD), WORLD, measurements, prior(), seed) for seed in (1, 1, 2))
+    one, same, other = map(digest, runs)
     assert one == same != other
 
 
 def test_an_absurd_range_is_doubted_and_moves_the_cloud_little():
-    measurements, truth = drive(outlier_at=150)
-    updates = radio_updates(Particle(world()), measurements, prior())
+    measurements, truth = circle(outlier_at=150)
+    updates = radio_updates(Particle(WORLD), WORLD, measurements, prior())
     fate = updates[29].fates[0]
     assert fate.decision is Decision.DOWNWEIGHTED
     assert fate.weight < 0.01
@@ -131,11 +86,11 @@ def test_resampling_keeps_mean_and_covariance():
 )
 def test_impossible_options_are_refused(options):
     with pytest.raises(ParameterError, match="particle"):
-        Particle(world(), **options)
+        Particle(WORLD, **options)
 
 
 def test_particles_are_the_cloud_at_the_last_epoch():
-    filter_, measurements = Particle(world()), drive(seconds=1)[0]
+    filter_, measurements = Particle(WORLD), circle(seconds=1)[0]
     robot = Stepped(filter_, prior())
     at_start = filter_.particles(robot.state)
     robot.feed(*measurements[:4])

@@ -1,4 +1,4 @@
-"""Trilateration alone: exact readings, anchors heard one by one, the floor's edge, and what it cannot know."""
+"""Trilateration alone: exact readings, anchors measured one by one, the floor's edge, and what it cannot know."""
 
 import math
 
@@ -14,32 +14,28 @@ from fusion import (
     ParameterError,
     Pose,
     Prior,
-    RangeReading,
     Ranges,
     Reason,
     RssiReading,
     WifiScan,
-    World,
 )
 from fusion.values import NANOSECONDS as SECOND
 from tests.estimators.stepping import Stepped
+from tests.worlds import PLACES, exact_ranges, ranged_world
 
-PLACES = {"a": (0.0, 0.0), "b": (8.0, 0.0), "c": (1.0, 6.0), "d": (9.0, 7.0)}
 THREE = ("a", "b", "c")
 NOWHERE = Prior(
     0, Pose(math.nan, math.nan, math.nan), Covariance.from_std(1, 1, 1), position_known=False, heading_known=False
 )
 
 
-def world(places=PLACES, robot=None):
-    anchors = [{"id": name, "position_m": list(place)} for name, place in places.items()]
-    return World.from_table({"anchors": anchors, "ranging": {"std_m": 0.1, "bias_std_m": 0.0}, "robot": robot or {}})
+def world(places=PLACES, **tables):
+    return ranged_world(places, ranging={"std_m": 0.1}, **tables)
 
 
-def scan(time_s, x, y, heard=THREE, places=PLACES):
-    """Exact ranges from (x, y) to the anchors ``heard``."""
-    readings = tuple(RangeReading(n, math.hypot(x - places[n][0], y - places[n][1])) for n in heard)
-    return Ranges(round(time_s * SECOND), "uwb", round(time_s * 1000), readings)
+def scan(time_s, x, y, names=THREE, places=PLACES):
+    """Exact ranges from (x, y) to the anchors ``names``."""
+    return exact_ranges(round(time_s * SECOND), round(time_s * 1000), (x, y), names, places)
 
 
 def after(measurements, place=None, **options):
@@ -52,9 +48,9 @@ def answer(measurements, **options):
     return after(measurements, **options)[0].estimate(measurements[-1].time_ns)
 
 
-@pytest.mark.parametrize("heard", [THREE, tuple(PLACES)])
-def test_exact_ranges_give_the_exact_place_and_no_heading(heard):
-    estimate = answer([scan(1, 3.0, 2.0, heard)])
+@pytest.mark.parametrize("names", [THREE, tuple(PLACES)])
+def test_exact_ranges_give_the_exact_place_and_no_heading(names):
+    estimate = answer([scan(1, 3.0, 2.0, names)])
     assert estimate.pose[:2] == pytest.approx((3.0, 2.0), abs=1e-6)
     assert estimate.valid
     assert not estimate.heading_known
@@ -78,7 +74,7 @@ def test_nothing_is_claimed_before_the_first_fix():
     assert {(f.decision, f.reason, f.weight) for f in fates} == {(Decision.UNUSABLE, Reason.TOO_FEW_ANCHORS, 0.0)}
 
 
-def test_anchors_heard_one_by_one_make_a_fix_inside_the_window_only():
+def test_anchors_measured_one_by_one_make_a_fix_inside_the_window_only():
     one_by_one = [scan(t, 3.0, 2.0, (name,)) for t, name in enumerate(THREE)]
     assert answer(one_by_one, window_s=2.0).pose[:2] == pytest.approx((3.0, 2.0), abs=1e-6)
     assert after(one_by_one, window_s=1.9)[1][0].reason is Reason.TOO_FEW_ANCHORS

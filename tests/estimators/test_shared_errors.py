@@ -33,33 +33,32 @@ from fusion.values import NANOSECONDS as SECOND
 from logs.truth import evaluation_instants
 from sensors.simulation.scenario import load_scenario
 from sensors.simulation.simulate import simulated_run
+from tests.worlds import PLAIN_NOISE, anchored_world
 
 PLACES = {"a": (-20.0, 3.0), "b": (25.0, -15.0), "c": (3.0, 28.0)}
 RADIO = {"shadowing_std_db": 2.0, "bias_std_db": 3.0, "path_loss_exponent": 2.5}
-QUIET = dict.fromkeys(("distance_scale_std", "turn_scale_std", "turn_bias_std_rad_s"), 0.0)
 START = Prior(0, Pose(0.0, 0.0, 0.0), Covariance.from_std(3.0, 3.0, 0.01))
 FILTERS = pytest.mark.parametrize("name", ["ekf", "filterpy_ekf", "filterpy_ukf", "particle", "bayes_grid"])
 
 
 def world(**radio):
-    anchors = [{"id": name, "position_m": list(place)} for name, place in PLACES.items()]
-    return World.from_table({"anchors": anchors, "radio": {**RADIO, **radio}, "robot": {"noise": QUIET}})
+    return anchored_world(PLACES, radio={**RADIO, **radio}, robot={"noise": PLAIN_NOISE})
 
 
 def scan(time_ns, seq):
-    """What the world expects to be heard at the start."""
+    """The signal strengths that the world expects at the start."""
     model = world().anchors[0].radio
-    heard = [RssiReading(name, float(model.expected(math.hypot(*place)))) for name, place in PLACES.items()]
-    return WifiScan(time_ns, "wifi", seq, tuple(heard))
+    readings = [RssiReading(name, float(model.expected(math.hypot(*place)))) for name, place in PLACES.items()]
+    return WifiScan(time_ns, "wifi", seq, tuple(readings))
 
 
 def spread(name, step_m, scans=40, radio=None, **options):
     """Trace of the position's covariance after ``scans``, the robot rocking to and fro by ``step_m`` in between."""
-    told = []
+    measurements = []
     for k in range(1, scans + 1):
-        told += [Odometry(k * SECOND, "w", k, (k - 1) * SECOND, step_m * (-1) ** k, 0.0), scan(k * SECOND, k)]
+        measurements += [Odometry(k * SECOND, "w", k, (k - 1) * SECOND, step_m * (-1) ** k, 0.0), scan(k * SECOND, k)]
     place = world(**(radio or {}))
-    covariance = list(track(build(name, place, options), place, told, START, seed=5))[-1].estimate.covariance
+    covariance = list(track(build(name, place, options), place, measurements, START, seed=5))[-1].estimate.covariance
     return covariance.xx + covariance.yy
 
 
@@ -76,7 +75,7 @@ def test_error_of_a_range_belongs_to_the_radio_and_is_not_counted_by_the_path():
 
 
 @FILTERS
-def test_robot_at_rest_grows_less_certain_of_what_it_hears_again_and_again(name):
+def test_robot_at_rest_grows_less_certain_of_what_it_receives_again_and_again(name):
     """Three times the common error at most: the information is that of 2^2 + 3 * 3^2 dB^2 in place of 2^2 + 3^2."""
     assert spread(name, 0.0) > 1.5 * spread(name, 0.0, max_correlated=1.0)
     assert spread(name, 0.0, max_correlated=10.0) > 1.5 * spread(name, 0.0)
@@ -93,10 +92,10 @@ def test_information_at_rest_is_that_of_the_inflated_noise(name):
     place, scans = world(), 8
     slopes = [s.expect(0.0, 0.0, 0.0, place.robot.antenna_m) for s in radio_readings(place, scan(0, 0))]
     rows = np.array([(slope.by_x, slope.by_y) for slope in slopes])
-    told = [scan(k * SECOND, k) for k in range(1, scans + 1)]
+    again = [scan(k * SECOND, k) for k in range(1, scans + 1)]
     start = Prior(0, START.pose, Covariance.from_std(1.0, 1.0, 1e-9))
     resting = [Odometry(k * SECOND, "w", k, (k - 1) * SECOND, 0.0, 0.0) for k in range(1, scans + 1)]
-    both = [item for pair in zip(resting, told, strict=True) for item in pair]
+    both = [item for pair in zip(resting, again, strict=True) for item in pair]
     got = list(track(build(name, place), place, both, start))[-1].estimate.covariance
     information = np.eye(2) + scans * rows.T @ rows / (2.0**2 + 3.0 * 3.0**2)
     assert np.array(got.matrix)[:2, :2] == pytest.approx(np.linalg.inv(information), rel=1e-2)
@@ -126,22 +125,22 @@ TOLD = {"shadowing_length_m": 5.0}
 @pytest.mark.parametrize(
     ("path_m", "max_correlated", "times"), [(0.0, None, 20.0), (0.5, None, 10.0), (9.0, None, 1.0), (0.5, 4.0, 4.0)]
 )
-def test_common_error_counts_as_often_as_the_world_tells_that_it_is_shared(path_m, max_correlated, times):
+def test_common_error_counts_as_often_as_the_world_states_that_it_is_shared(path_m, max_correlated, times):
     reading = radio_readings(world(**TOLD), scan(0, 0))[0]
     assert repeated_variance(reading, path_m, max_correlated) == pytest.approx(2.0**2 + times * 3.0**2)
 
 
-def test_common_error_counts_up_to_three_times_where_the_world_does_not_tell():
+def test_common_error_counts_up_to_three_times_where_the_world_states_no_length():
     reading = radio_readings(world(), scan(0, 0))[0]
     assert repeated_variance(reading, 0.0, None) == repeated_variance(reading, 0.0, 3.0)
 
 
 @FILTERS
-def test_filter_that_is_told_how_long_shadowing_lasts_is_not_made_sure_by_its_repetition(name):
+def test_filter_that_knows_how_long_shadowing_lasts_is_not_made_sure_by_its_repetition(name):
     assert spread(name, 0.5, radio=TOLD) > 1.5 * spread(name, 0.5)
 
 
-def test_error_of_an_anchor_is_a_state_where_the_world_tells_its_length_or_a_parameter_asks():
+def test_error_of_an_anchor_is_a_state_where_the_world_states_its_length_or_a_parameter_asks():
     def states(place, **options):
         estimator = build("ekf", place, options)
         state = estimator.start(START, seed=0)
@@ -165,19 +164,19 @@ def offices():
 
 
 @pytest.mark.parametrize("name", ["ekf", "particle"])
-def test_filter_that_is_told_is_more_honest_and_better_in_a_simulated_office(name, offices):
+def test_filter_that_knows_the_length_is_more_honest_and_better_in_a_simulated_office(name, offices):
     """The simulated field is Gaussian with a squared-exponential correlation: alike, not equal, to what is assumed."""
     found = {}
-    for told in (True, False):
+    for stated in (True, False):
         scores = []
         for run in offices:
             table = json.loads(run.world.table)
-            if not told:
+            if not stated:
                 del table["radio"]["shadowing_length_m"]
             lane = run_estimator(replace(run, world=World.from_table(table)), name, seed=0)
             instants = evaluation_instants(run.truth)
             scores.append(metrics(errors(instants, match(instants, lane.track))))
-        found[told] = [float(np.mean([score[key] for score in scores])) for key in ("pos_rmse", "anees")]
+        found[stated] = [float(np.mean([score[key] for score in scores])) for key in ("pos_rmse", "anees")]
     assert found[True][0] < found[False][0]
     assert found[True][1] < 2.0
     assert found[False][1] > 3.0

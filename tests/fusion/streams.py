@@ -2,9 +2,10 @@
 
 import math
 from collections import Counter
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import reduce
 
+import numpy as np
 from hypothesis import strategies as st
 
 from fusion import (
@@ -40,6 +41,29 @@ ANCHORS = [
 ]
 WORLD = World.from_table({"anchors": ANCHORS})
 PRIOR = Prior(0, Pose(2.0, 1.0, 0.3), Covariance.from_std(0.1, 0.1, 0.1))
+
+
+def world(**extra):
+    return World.from_table({"anchors": ANCHORS, **extra})
+
+
+def prior(**known):
+    return replace(PRIOR, **known)
+
+
+def drive(seconds=20, seed=1):
+    """A gentle curve with odometry at 10 Hz and a scan of all anchors at 2 Hz."""
+    random = np.random.default_rng(seed)
+    pose, measurements = Pose(2.0, 1.0, 0.3), []
+    for k in range(1, seconds * 10 + 1):
+        t = k * SECOND // 10
+        pose = pose.compose(Pose(0.03, 0.0, 0.02))
+        measurements.append(Odometry(t, "wheels", k, t - SECOND // 10, 0.03, 0.02))
+        if k % 5 == 0:
+            far = {a["id"]: math.dist((pose.x, pose.y, 0.0), a["position_m"]) for a in ANCHORS}
+            readings = tuple(RangeReading(n, d + random.normal(0, 0.1)) for n, d in far.items())
+            measurements.append(Ranges(t, "uwb", k, readings))
+    return measurements, pose
 
 
 def odometry(k, distance_m=0.05, turn_rad=0.02, period_ns=SECOND // 10):
@@ -182,3 +206,18 @@ class Ledger:
     def particles(self, state):
         """The state itself, for tests to look at."""
         return state
+
+
+class Steps(list):
+    """Steps of motion that an odometer hands over, as increments."""
+
+    def __call__(self, from_ns, time_ns, distance_m, turn_rad, measured):
+        self.append(Odometry(time_ns, "step", len(self), from_ns, distance_m, turn_rad, measured))
+
+
+def stepped(odometer, *measurements):
+    """The steps of several measurements."""
+    steps = Steps()
+    for measurement in measurements:
+        odometer.advance(measurement, steps)
+    return steps

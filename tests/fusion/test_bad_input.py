@@ -86,7 +86,7 @@ START = Prior(0, Pose(1.0, 2.0, 0.5), Covariance.from_std(0.1, 0.1, 0.1))
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         ({"pose": Pose(math.nan, 2.0, 0.5)}, "prior: x is nan, no finite number"),
         ({"pose": Pose(1.0, -math.inf, 0.5)}, "prior: y is -inf"),
@@ -103,8 +103,8 @@ START = Prior(0, Pose(1.0, 2.0, 0.5), Covariance.from_std(0.1, 0.1, 0.1))
         ({"covariance": np.eye(3)}, "is no fusion.Covariance; Covariance.from_matrix makes one"),
     ],
 )
-def test_prior_that_no_estimator_could_start_from_is_refused_by_name(change, told):
-    with pytest.raises(BeliefError, match=told):
+def test_prior_that_no_estimator_could_start_from_is_refused_by_name(change, message):
+    with pytest.raises(BeliefError, match=message):
         replace(START, **change)
 
 

@@ -5,18 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from fusion import (
-    Decision,
-    Estimate,
-    Fate,
-    Increment,
-    Odometry,
-    Pose,
-    Reason,
-    Update,
-    digest,
-    final,
-)
+from fusion import Decision, Estimate, Fate, Increment, Odometry, Pose, Reason, Update, digest, final
 from fusion.certificate import Certificate
 from tests.fusion.streams import (
     CLOSED_S,
@@ -50,7 +39,7 @@ def by_an_ulp(number):
 
 @pytest.mark.parametrize("name", ["distance_m", "turn_rad"])
 @pytest.mark.parametrize("estimator", [Constant, Ledger])
-def test_certificate_tells_motions_apart_that_differ_in_the_last_bit(estimator, name):
+def test_certificate_distinguishes_motions_that_differ_in_the_last_bit(estimator, name):
     """An epoch of one increment, for a sum may swallow a bit; to `Constant` nothing else differs."""
     stream = [odometry(1), ranges(SECOND // 10), *STREAM[1:]]
     moved = changed(stream, 0, **{name: by_an_ulp(getattr(stream[0], name))})
@@ -163,7 +152,7 @@ def test_certificate_so_far_is_the_digest_of_the_updates_so_far():
             assert certificate.digest == digest(updates[:count])
 
 
-def test_certificate_tells_an_order_of_arrival_apart_and_the_last_words_do_not():
+def test_certificate_distinguishes_an_order_of_arrival_and_the_last_words_do_not():
     in_order, revised = updates_of(Ledger(), STREAM), updates_of(Ledger(), LATE)
     assert digest(in_order) != digest(revised)
     assert digest(final(in_order)) == digest(final(revised))

@@ -8,18 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fusion import (
-    Decision,
-    Gyro,
-    Increment,
-    MeasurementError,
-    Odometry,
-    RangeReading,
-    Ranges,
-    Reason,
-    WheelTicks,
-    move,
-)
+from fusion import Decision, Gyro, Increment, MeasurementError, Odometry, RangeReading, Ranges, Reason, WheelTicks, move
 from fusion.epochs import LONGEST, FrontEnd, Longest
 from tests.fusion.streams import (
     MILLISECOND,

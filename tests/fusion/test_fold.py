@@ -7,14 +7,7 @@ import weakref
 import pytest
 from hypothesis import given
 
-from fusion import (
-    Estimate,
-    ParameterError,
-    PluginError,
-    Update,
-    build,
-    digest,
-)
+from fusion import Estimate, ParameterError, PluginError, Update, build, digest
 from fusion.fold import Fold
 from fusion.timeline import Timeline
 from fusion.tracker import Tracker
@@ -230,7 +223,7 @@ def test_estimator_that_fails_when_asked_is_named_with_the_time_and_only_then():
         Tracker(FailsToEstimate(), WORLD, PRIOR).estimate(7 * SECOND)
 
 
-def test_failure_says_what_to_do():
+def test_failure_states_the_remedy():
     with pytest.raises(PluginError, match=r"--estimators.*author"):
         updates_of(FailsToStep(), STREAM)
 

@@ -4,10 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusion import BeliefError, Covariance
+from fusion import BeliefError, Covariance, Pose, wrap_angle
+
+reals = st.floats(-50.0, 50.0)
+angles = st.floats(-3.0, 3.0)
 
 factor = st.floats(-10.0, 10.0)
 
@@ -53,3 +56,18 @@ def test_matrix_that_is_not_symmetric_is_refused_but_for_rounding():
         Covariance.from_matrix([[1.0, 0.0, 0.5], [0.0, 1.0, 0.0], [-0.5, 0.0, 1.0]])
     rounded = Covariance.from_matrix([[1.0, 0.1, 0.0], [math.nextafter(0.1, 1.0), 1.0, 0.0], [0.0, 0.0, 1.0]])
     assert rounded.xy == 0.1
+
+
+@given(angles, st.integers(-5, 5))
+@settings(derandomize=True)
+def test_wrapped_angle_is_the_same_angle(angle, turns):
+    wrapped = wrap_angle(angle + turns * math.tau)
+    assert -math.pi < wrapped <= math.pi
+    assert math.isclose(math.remainder(wrapped - angle, math.tau), 0.0, abs_tol=1e-9)
+
+
+@given(reals, reals, angles)
+@settings(derandomize=True)
+def test_pose_composed_with_its_inverse_is_the_origin(x, y, heading):
+    pose = Pose(x, y, heading)
+    assert pose.compose(pose.inverse()) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)

@@ -1,4 +1,4 @@
-"""Plug-ins that cannot be brought in say why, and none hides the others."""
+"""Plug-ins that cannot be brought in are refused with the reason, and none hides the others."""
 
 import argparse
 import importlib.metadata
@@ -82,7 +82,7 @@ def test_check_of_what_is_not_installed_is_one_sentence(stranger, capsys):
     assert capsys.readouterr() == ("", f"fusion check: lacking_one: {stranger}\n")
 
 
-def test_module_that_hides_a_package_is_told_to_be_renamed(installed):
+def test_module_that_hides_a_package_is_refused_with_a_hint_to_rename(installed):
     installed(("hidden", "argparse.filters:Hidden"))
     with pytest.raises(PluginError, match=r"argparse\.py beside your script hides the package; rename it"):
         fusion.load("hidden")

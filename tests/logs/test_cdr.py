@@ -101,7 +101,7 @@ def test_message_cut_off_at_any_byte_is_refused(value):
     assert codec.decode(data, value.seq) == value
     for length in range(len(data)):
         if codec.schema.startswith("sensor_msgs/") and length >= len(data) - 20 * 8:
-            break  # the gyro's rate and its covariance stand before 20 doubles that say nothing
+            break  # the gyro's rate and its covariance stand before 20 doubles that mean nothing
         with pytest.raises((struct.error, ValueError)):
             codec.decode(data[:length], value.seq)
 

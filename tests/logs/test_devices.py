@@ -1,4 +1,4 @@
-"""What a recording tells of its computer and its devices."""
+"""The computer and the devices of a recording."""
 
 from fusion import Diagnostic, Level
 from logs.device_messages import ClockSync
@@ -18,14 +18,14 @@ def test_a_clock_that_runs_evenly_has_no_steps():
     assert clock == {"began": "2025-11-25T00:00:05+00:00", "synced": True, "steps": [], "suspended_s": 0.0}
 
 
-def test_a_step_of_the_wall_clock_is_told_and_the_last_setting_believed():
+def test_a_step_of_the_wall_clock_is_reported_and_the_last_setting_believed():
     """A Pi without a clock of its own boots in the past, and NTP sets it while it records."""
     clock = wall_clock([sync(100, -5000, synced=False), sync(110, -4990, synced=False), sync(120, 20)], 100 * SECOND)
     assert clock["steps"] == [{"at_s": 20.0, "by_s": 5000.0}]
     assert (clock["began"], clock["synced"]) == ("2025-11-25T00:00:00+00:00", True)
 
 
-def test_a_suspended_computer_is_told():
+def test_a_suspended_computer_is_reported():
     assert wall_clock([sync(100, 0), sync(400, 300, monotonic_s=130)], 0)["suspended_s"] == 270.0
     assert wall_clock([], 0) is None
 

@@ -1,4 +1,4 @@
-"""What goes into a log comes out of it, to the bit, and a damaged one says so."""
+"""A log keeps what is written to the bit, and a damaged one opens with a warning."""
 
 import json
 import math
@@ -22,7 +22,6 @@ from fusion import (
     Truth,
     WheelTicks,
     WifiScan,
-    World,
 )
 from logs.cli.export import export_csv
 from logs.cli.import_ import import_recordings
@@ -30,11 +29,10 @@ from logs.cli.info import describe
 from logs.messages import PRIOR, encode_prior
 from logs.reader import read_run
 from logs.writer import RunWriter
+from tests.worlds import anchored_world
 
 SECOND = 1_000_000_000
-WORLD = World.from_table(
-    {"name": "here", "anchors": [{"id": "ä", "position_m": [0, 0]}, {"id": "b", "position_m": [1, 0]}]}
-)
+WORLD = anchored_world({"ä": (0, 0), "b": (1, 0)}, name="here")
 EVERY_KIND = (
     WheelTicks(SECOND, "enc", 1, (1, -2, 3, 4)),
     MotorCommand(SECOND + 1, "cmd", 2, (0.1, -0.2)),
@@ -101,7 +99,7 @@ def test_prior_of_an_older_log_that_no_estimator_could_start_from_is_left_out(tm
     assert "its starting prior is left out (prior: " in warning
 
 
-def test_file_cut_anywhere_opens_with_a_warning_or_says_what_it_is(tmp_path):
+def test_file_cut_anywhere_opens_with_a_warning_or_is_refused_with_the_reason(tmp_path):
     whole = write(tmp_path / "run.mcap", count=30).read_bytes()
     cut = tmp_path / "cut.mcap"
     for share in range(1, 40):
@@ -146,7 +144,7 @@ def test_exported_bundle_imports_as_the_same_run(tmp_path):
     assert after.truth.x.tolist() == before.truth.x.tolist()
 
 
-def test_info_tells_rates_gaps_and_warnings(tmp_path):
+def test_info_shows_rates_gaps_and_warnings(tmp_path):
     about = describe(write(tmp_path / "run.mcap", count=11))
     gyro = next(row for row in about["channels"] if row["kind"] == "Gyro")
     assert gyro["rate_hz"] == pytest.approx(1.0)

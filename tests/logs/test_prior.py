@@ -10,7 +10,7 @@ import fusion
 from benchmarks.review.frame import Frame
 from benchmarks.runner.estimator_run import run_estimator
 from estimators.dead_reckoning import DeadReckoning
-from fusion import Covariance, Odometry, Pose, Prior, RssiReading, Truth, WifiScan, World
+from fusion import Covariance, Odometry, Pose, Prior, RssiReading, Truth, WifiScan
 from fusion.belief import UNKNOWN_HEADING_STD
 from logs.cli.info import describe
 from logs.prior import begin_ns, prior_from_truth, starting_prior
@@ -18,18 +18,14 @@ from logs.reader import read_run
 from logs.usability import usability
 from logs.writer import RunWriter
 from sensors.calibration.segments import read_segments
+from tests.worlds import anchored_world
 
 SECOND = 1_000_000_000
 TENTH = SECOND // 10
 START = 5 * SECOND
 """The first odometry increment begins here; its message is stamped a tenth of a second later."""
-WORLD = World.from_table(
-    {
-        "name": "hall",
-        "bounds": {"x_min": 0.0, "x_max": 12.0, "y_min": 0.0, "y_max": 6.0},
-        "anchors": [{"id": "a", "position_m": [1.0, 1.0]}],
-    }
-)
+BOUNDS = {"x_min": 0.0, "x_max": 12.0, "y_min": 0.0, "y_max": 6.0}
+WORLD = anchored_world({"a": (1.0, 1.0)}, name="hall", bounds=BOUNDS)
 KNOWN = Prior(START, Pose(1.0, 2.0, 0.5), Covariance.from_std(0.3, 0.2, 0.1))
 
 

@@ -6,13 +6,14 @@ import json
 import pytest
 
 from benchmarks.runner.adhoc_suite import bench, remarks
-from fusion import Diagnostic, Level, MotorCommand, Odometry, Truth, WheelTicks, World
+from fusion import Diagnostic, Level, MotorCommand, Odometry, Truth, WheelTicks
 from fusion.cli.main import main
 from logs.cli.import_ import import_recordings
 from logs.reader import read_run
 from logs.wheel_direction import LEAST_M, DirectionWatch, caution, caution_of_run
 from logs.writer import RunWriter
 from sensors.cli.calibration import Findings, calibrate
+from tests.worlds import empty_world
 
 SECOND = 1_000_000_000
 TICK_M = 0.0102
@@ -25,8 +26,7 @@ KINDS = {"bare": {WheelTicks, Truth}, "commanded": {WheelTicks, MotorCommand}, "
 
 
 def world(encoder="single_channel", drive="differential"):
-    bounds = {"x_min": 0, "x_max": 9, "y_min": 0, "y_max": 9}
-    return World.from_table({"name": "hall", "bounds": bounds, "robot": {"encoder": encoder, "drive": drive}})
+    return empty_world(name="hall", robot={"encoder": encoder, "drive": drive})
 
 
 ROBOT = world().robot
@@ -118,9 +118,9 @@ def test_a_watch_that_saw_nothing_warns_of_nothing():
 def log(tmp_path):
     """Writes a log of measurements and remarks; answers its path."""
 
-    def write(*said, about=None, encoder="single_channel"):
+    def write(*outputs, about=None, encoder="single_channel"):
         with RunWriter(tmp_path / "run.mcap", world(encoder), name="run", metadata=about or {}) as writer:
-            for one in said:
+            for one in outputs:
                 if isinstance(one, Diagnostic):
                     writer.write_diagnostic(one)
                 else:

@@ -1,4 +1,4 @@
-"""A log keeps every bit, survives a crash but for its last second, and says what is wrong with it."""
+"""A log keeps every bit, survives a crash but for its last second, and states what is wrong with it."""
 
 import math
 import random
@@ -22,17 +22,15 @@ from fusion import (
     Ranges,
     Truth,
     Update,
-    World,
 )
 from logs.messages import CODECS
 from logs.reader import read_run
 from logs.schemas import SCHEMAS
 from logs.writer import RUN_RECORD, RunWriter
+from tests.worlds import anchored_world
 
 SECOND = 1_000_000_000
-WORLD = World.from_table(
-    {"name": "here", "anchors": [{"id": "a", "position_m": [0, 0]}, {"id": "b", "position_m": [1, 0]}]}
-)
+WORLD = anchored_world({"a": (0, 0), "b": (1, 0)}, name="here")
 
 
 def gyro(time_ns, rate=0.5, seq=0):
@@ -148,7 +146,7 @@ def test_damaged_byte_never_changes_a_value_unnoticed(tmp_path):
         assert len(run.measurements) == 200 or run.warnings
 
 
-def test_zero_filled_tail_is_told(tmp_path):
+def test_zero_filled_tail_is_reported(tmp_path):
     path = written(tmp_path / "run.mcap", ten_seconds())
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2] + bytes(500))
@@ -197,7 +195,7 @@ def test_place_that_cannot_be_written_is_refused(tmp_path):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
-def test_full_disk_is_told_in_one_sentence():
+def test_full_disk_is_reported_in_one_sentence():
     with pytest.raises(LogError, match="free some space"):
         written(Path("/dev/full"), ten_seconds())
 
@@ -230,7 +228,7 @@ def test_log_with_a_world_that_contradicts_itself_is_refused(tmp_path):
         read_run(foreign(tmp_path / "run.mcap", {"world": '{"anchor": []}'}))
 
 
-def test_measurement_is_known_by_its_type_and_other_topics_are_told(tmp_path):
+def test_measurement_is_known_by_its_type_and_other_topics_are_reported(tmp_path):
     run = read_run(foreign(tmp_path / "run.mcap", {"world": WORLD.table, "world_hash": "another"}, ("/chatter", b"")))
     assert run.measurements == (gyro(SECOND),)
     assert "hash differs" in run.warnings[0]

@@ -27,11 +27,10 @@ from logs.cli.export import export_csv, export_tum
 from logs.cli.import_ import import_recordings
 from logs.reader import read_run
 from logs.writer import RunWriter
+from tests.worlds import anchored_world
 
 T = 1_652_380_260_171_842_098
-WORLD = World.from_table(
-    {"name": "here", "anchors": [{"id": "ä, b", "position_m": [0, 0]}, {"id": "c", "position_m": [1, 0.1]}]}
-)
+WORLD = anchored_world({"ä, b": (0, 0), "c": (1, 0.1)}, name="here")
 WORLD_TOML = '[[anchors]]\nid = "c"\nposition_m = [0, 0]\n'
 MEASUREMENTS = (
     Odometry(T, "odometry", 0, T - 10, 0.1 + 0.2, -1e-17),

@@ -3,36 +3,25 @@
 import json
 import math
 
-import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-import fusion
 from fusion import (
     Covariance,
-    Estimate,
     Gyro,
-    Odometry,
     Pose,
     Prior,
     RangeReading,
     Ranges,
-    RssiReading,
-    Tag,
     Truth,
-    WifiScan,
-    World,
-    registered,
 )
 from fusion.cli.main import main
 from logs.cli.info import describe
-from logs.timing import JUMP_MESSAGES, JUMP_NS, Stream
 from logs.writer import RunWriter
+from tests.worlds import empty_world
 
 SECOND = 1_000_000_000
-WORLD = World.from_table({"name": "here", "bounds": {"x_min": 0, "x_max": 1, "y_min": 0, "y_max": 1}})
+WORLD = empty_world(name="here")
 GYRO_S = (0, 1, 2, 5, 3)
 """Times in the order of their arrival: the last one is late."""
 
@@ -69,20 +58,20 @@ def test_text_names_world_hash_late_stamps_and_what_is_missing(log, capsys):
 
 
 @pytest.mark.parametrize(
-    ("headings", "told"),
+    ("headings", "words"),
     [
         ((0.5, 0.5), "2 poses"),
         ((0.5, None), "2 poses, the heading known at 1 of them"),
         ((None, math.nan), "2 poses, the heading known at none of them"),
     ],
 )
-def test_true_headings_are_counted(tmp_path, capsys, headings, told):
+def test_true_headings_are_counted(tmp_path, capsys, headings, words):
     with RunWriter(tmp_path / "run.mcap", WORLD, name="walk") as writer:
         writer.write(Gyro(0, "g", 0, 0.0))
         for i, heading in enumerate(headings):
             writer.write_truth(Truth(i, 1.0, 2.0, heading))
     assert main(["info", str(tmp_path / "run.mcap")]) == 0
-    assert f"truth: {told}\n" in capsys.readouterr().out
+    assert f"truth: {words}\n" in capsys.readouterr().out
 
 
 def test_cut_off_log_is_described_with_its_warning(log, capsys):
@@ -98,7 +87,7 @@ def test_file_that_is_no_log_is_one_sentence_and_exit_1(tmp_path, capsys):
     assert "is no MCAP file" in line
 
 
-def test_foreign_bag_is_told_topic_by_topic_with_the_roles_each_could_play(tmp_path, ros, capsys):
+def test_foreign_bag_is_described_topic_by_topic_with_the_roles_each_could_play(tmp_path, ros, capsys):
     rows = [("/odom", t * SECOND, ros.odometry(t * SECOND, 0.0, 0.0, 0.0)) for t in range(5)]
     rows += [
         (
@@ -128,54 +117,14 @@ def test_foreign_bag_is_told_topic_by_topic_with_the_roles_each_could_play(tmp_p
     assert "fusion import rosbag" in text
 
 
-def test_foreign_bag_cut_off_is_told_with_what_cannot_be_read(tmp_path, ros, capsys):
+def test_foreign_bag_cut_off_is_described_with_what_cannot_be_read(tmp_path, ros, capsys):
     (file,) = ros.bag(tmp_path / "walk", [("/imu", SECOND, ros.imu(SECOND, 0.5))]).glob("*.mcap")
     file.write_bytes(file.read_bytes()[:-30])
     assert main(["info", str(file)]) == 0
     assert "warning: " in capsys.readouterr().out
 
 
-def stream(stamps, delays, numbers=None):
-    stamps = np.array(stamps, dtype=np.int64)
-    arrivals = stamps + np.array(delays, dtype=np.int64)
-    return Stream(stamps, arrivals, np.arange(len(stamps)) if numbers is None else np.array(numbers))
-
-
-@settings(derandomize=True)
-@given(st.integers(2 * JUMP_MESSAGES, 60), st.lists(st.integers(0, JUMP_NS // 2), min_size=60, max_size=60))
-def test_regular_stream_with_any_small_delay_has_nothing_odd(count, delays):
-    timing = stream([i * SECOND for i in range(count)], delays[:count]).timing(0)
-    assert (timing["rate_hz"], timing["period_s"], timing["gaps"], timing["longest_gap_s"]) == (1.0, 1.0, 0, 1.0)
-    assert (timing["duplicates"], timing["out_of_order"], timing["clock_jumps"]) == (0, 0, [])
-    assert timing["latest_s"] == max(delays[:count]) / SECOND
-
-
-@settings(derandomize=True)
-@given(
-    st.integers(4 + JUMP_MESSAGES, 50),
-    st.sampled_from([-3600.0, -5.0, -0.2, 0.2, 5.0, 1e6]),
-    st.lists(st.integers(0, JUMP_NS // 2), min_size=60, max_size=60),
-)
-def test_clock_jump_is_found_where_it_is_and_a_late_message_is_none(place, jump_s, delays):
-    """The log time steps by ``jump_s`` before the message at ``place``; one well before comes half an hour late."""
-    jumped = [delay + (round(jump_s * SECOND) if i >= place else 0) for i, delay in enumerate(delays)]
-    jumped[3] += 1800 * SECOND
-    ((at, by_ns),) = stream([i * SECOND for i in range(60)], jumped).jumps()
-    assert at == place
-    assert abs(by_ns - jump_s * SECOND) <= JUMP_NS / 2
-
-
-def test_short_stream_tells_of_no_jump():
-    assert stream(range(19), [0] * 10 + [SECOND] * 9).jumps() == []
-
-
-def test_gaps_are_counted_and_placed_and_twins_are_told():
-    timing = stream([0, 1, 2, 3, 10, 11, 12, 20, 20, 21], [0] * 10, [0, 1, 2, 3, 4, 5, 6, 7, 7, 8]).timing(0)
-    assert (timing["gaps"], timing["duplicates"]) == (2, 1)
-    assert (timing["longest_gap_s"], timing["longest_gap_at_s"]) == (8e-9, 12e-9)
-
-
-def test_clock_of_the_recorder_that_is_set_back_is_told_in_words(tmp_path, capsys):
+def test_clock_of_the_recorder_that_is_set_back_is_reported_in_words(tmp_path, capsys):
     """It arrives a second late each time; the log time is set back by 15 s before number 20, and number 30 is lost."""
     path = tmp_path / "run.mcap"
     with RunWriter(path, WORLD, name="back") as writer:
@@ -192,144 +141,19 @@ def test_clock_of_the_recorder_that_is_set_back_is_told_in_words(tmp_path, capsy
     assert "clock jump at 20.0 s: its delay changes by -15.00 s, times that the log time runs backwards: 1" in text
 
 
-ANCHORED = World.from_table(
-    {"name": "here", "anchors": [{"id": i, "position_m": p} for i, p in (("a", [0, 0]), ("b", [9, 0]), ("c", [0, 9]))]}
-)
-KNOWN = Prior(0, Pose(3.0, 3.0, 0.0), Covariance.from_std(0.1, 0.1, 0.1))
-SPEED_M_S = 0.1
-
-
-def drive(path, *, prior=KNOWN, odometry=True, anchors="abc", truth=()):
-    """Three seconds in a straight line, a range to each of the anchors every half second."""
-    with RunWriter(path, ANCHORED, name="drive", prior=prior) as writer:
-        for number in range(1, 31):
-            time_ns, x = number * SECOND // 10, 3.0 + SPEED_M_S * number / 10
-            if odometry:
-                writer.write(Odometry(time_ns, "odo", number, time_ns - SECOND // 10, SPEED_M_S / 10, 0.0))
-            if number % 5 == 0 and anchors:
-                ranges = {"a": np.hypot(x, 3.0), "b": np.hypot(9.0 - x, 3.0), "c": np.hypot(x, 6.0), "z": 1.0}
-                readings = tuple(RangeReading(anchor, float(ranges[anchor]), 0.1) for anchor in anchors)
-                writer.write(Ranges(time_ns, "uwb", number, readings))
-        for pose in truth:
-            writer.write_truth(pose)
-    return path
-
-
-def verdicts(path):
-    return {row["estimator"]: row for row in describe(path)["usability"]}
-
-
-def test_every_installed_estimator_can_use_a_full_log(tmp_path):
-    rows = verdicts(drive(tmp_path / "run.mcap"))
-    assert tuple(rows) == fusion.available()
-    assert {name for name, row in rows.items() if not row["usable"]} == set()
-    assert (rows["ekf"]["readings"], rows["ekf"]["used"]) == (18, 18)
-
-
-def test_estimator_that_is_not_installed_is_reported_once(stranger, tmp_path, capsys):
-    path = drive(tmp_path / "run.mcap")
-    assert {"lacking_one", "lacking_two"}.isdisjoint(verdicts(path))
-    assert main(["info", str(path)]) == 0
-    assert f"  lacking_one, lacking_two: {stranger}\n" in capsys.readouterr().out
-
-
-def test_what_is_missing_is_named_estimator_by_estimator(tmp_path, capsys):
-    rows = verdicts(drive(tmp_path / "blind.mcap", prior=None))
-    assert rows["particle"]["usable"]
-    assert rows["ekf"]["lacks"] == ["the start position is unknown"]
-    assert rows["bayes_weight"]["lacks"] == ["the start heading is unknown"]
-    rows = verdicts(drive(tmp_path / "deaf.mcap", anchors=""))
-    assert rows["dead_reckoning"]["usable"]
-    assert rows["ekf"]["lacks"] == ["no radio readings"]
-    rows = verdicts(drive(tmp_path / "still.mcap", odometry=False))
-    assert rows["dead_reckoning"]["lacks"] == ["no odometry"]
-    rows = verdicts(drive(tmp_path / "two.mcap", anchors="ab"))
-    assert rows["radio_only"]["lacks"] == ["no reading of the replay enters it"]
-    assert rows["radio_only"]["refused"] == {"too_few_anchors": 12}
-    assert main(["info", str(tmp_path / "two.mcap")]) == 0
-    text = capsys.readouterr().out
-    assert "radio_only              no   no reading of the replay enters it; 0 of 12 readings used, 12 too" in text
-    assert "never received: c" in text
-
-
-def test_truth_gives_a_start_where_the_log_has_none_of_its_own(tmp_path):
-    rows = verdicts(drive(tmp_path / "run.mcap", prior=None, truth=[Truth(SECOND, 3.1, 3.0, 0.0)]))
-    assert rows["ekf"]["usable"]
-    rows = verdicts(drive(tmp_path / "other.mcap", prior=None, truth=[Truth(SECOND, 3.1, 3.0)]))
-    assert rows["ekf"]["usable"]
-    assert rows["dead_reckoning"]["lacks"] == ["the start heading is unknown"]
-
-
-def test_readings_of_unknown_anchors_are_counted_and_refused(tmp_path, capsys):
-    path = drive(tmp_path / "run.mcap", anchors="abcz")
-    about = describe(path)
-    assert (about["readings"], about["unknown_anchors"]) == ({"a": 6, "b": 6, "c": 6}, {"z": 6})
-    assert verdicts(path)["ekf"]["refused"] == {"unknown_anchor": 6}
-    assert main(["info", str(path)]) == 0
-    assert "readings of what is no anchor of the world: z (6)" in capsys.readouterr().out
-
-
-class Stubborn:
-    """Uses signal strengths only, and falls over the second one."""
-
-    summary, tags = "for this test", frozenset({Tag.GLOBAL_START, Tag.NO_HEADING})
-
-    def __init__(self, world):
-        pass
-
-    def start(self, prior, seed):
-        return 0
-
-    def step(self, state, motion, scan):
-        if isinstance(scan, WifiScan):
-            return state + 1, (1 / (1 - state),)
-        return state, ()
-
-    def estimate(self, state, motion, time_ns):
-        return Estimate(time_ns, Pose(0.0, 0.0, 0.0), None)
-
-
-class Broken(Stubborn):
-    """Cannot even start."""
-
-    def start(self, prior, seed):
-        raise KeyError("start")
-
-
-def test_radio_that_begins_late_is_replayed_all_the_same(tmp_path):
-    with RunWriter(tmp_path / "run.mcap", ANCHORED, name="late", prior=KNOWN) as writer:
-        for number in range(1, 2200):
-            time_ns = number * SECOND // 100
-            writer.write(Odometry(time_ns, "odo", number, time_ns - SECOND // 100, 0.0, 0.0))
-        writer.write(Ranges(22 * SECOND, "uwb", 1, (RangeReading("a", float(np.hypot(3.0, 3.0))),)))
-    row = verdicts(tmp_path / "run.mcap")["ekf"]
-    assert (row["usable"], row["readings"], row["used"]) == (True, 1, 1)
-
-
-def test_estimator_that_fails_on_the_log_is_told_with_its_error(tmp_path):
-    path = tmp_path / "run.mcap"
-    with RunWriter(path, ANCHORED, name="test", prior=KNOWN) as writer:
-        for number in range(1, 4):
-            writer.write(WifiScan(number * SECOND, "wifi", number, (RssiReading("a", -50.0),)))
-    with registered("stubborn", Stubborn), registered("broken", Broken):
-        rows = verdicts(path)
-    assert not rows["stubborn"]["usable"]
-    assert "ZeroDivisionError" in rows["stubborn"]["lacks"][0]
-    assert "Broken failed at its start: KeyError('start')" in rows["broken"]["lacks"][0]
-
-
-def test_several_files_are_told_and_one_that_is_none_does_not_hide_the_others(tmp_path, log, capsys):
-    other = drive(tmp_path / "drive.mcap")
+def test_several_files_are_described_and_one_that_is_none_does_not_hide_the_others(tmp_path, log, capsys):
+    parts_of(tmp_path, "a")
+    other = tmp_path / "part-0.mcap"
     (tmp_path / "odd.mcap").write_text("hello")
     assert main(["info", str(log), str(other), "--json"]) == 0
-    assert [about["name"] for about in json.loads(capsys.readouterr().out)] == ["walk", "drive"]
+    assert [about["name"] for about in json.loads(capsys.readouterr().out)] == ["walk", "part-0"]
     assert main(["info", str(log), str(tmp_path / "odd.mcap"), str(other)]) == 1
     out, err = capsys.readouterr()
-    assert out.index("walk: ") < out.index("drive: ")
+    assert out.index("walk: ") < out.index("part-0: ")
     assert "is no MCAP file" in err
 
 
-def test_json_of_a_damaged_log_holds_what_repair_would_tell(tmp_path, log, capsys):
+def test_json_of_a_damaged_log_holds_what_repair_would_state(tmp_path, log, capsys):
     with log.open("rb") as stream:
         last = make_reader(stream).get_summary().chunk_indexes[-1]
     log.write_bytes(log.read_bytes()[: last.chunk_start_offset + 30])

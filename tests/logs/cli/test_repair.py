@@ -57,14 +57,14 @@ for number in range(10**9):
 
 
 @pytest.mark.parametrize("moment", [1, 99, 731, 4242, 9999])
-def test_killed_recorder_loses_no_more_than_is_told(tmp_path, moment):
+def test_killed_recorder_loses_no_more_than_is_stated(tmp_path, moment):
     path, good = tmp_path / "run.mcap", tmp_path / "good.mcap"
     with subprocess.Popen([sys.executable, "-c", RECORDER, str(path)], stdout=subprocess.PIPE) as recorder:
         for _ in range(moment):
             recorder.stdout.readline()
         recorder.kill()
-        told = recorder.stdout.read().splitlines()
-    written = int(told[-1]) if told else moment - 1
+        lines = recorder.stdout.read().splitlines()
+    written = int(lines[-1]) if lines else moment - 1
     repaired = repair(path, good)
     kept = read_run(good).measurements
     assert [measurement.seq for measurement in kept] == list(range(len(kept)))
@@ -88,7 +88,7 @@ def test_rosbags_and_rerun_open_what_was_repaired(tmp_path):
     assert subprocess.run([rerun, "mcap", "check", path], capture_output=True, check=False).returncode != 0
 
 
-def test_command_tells_what_was_kept_and_lost_in_words_and_as_json(tmp_path, capsys):
+def test_command_prints_what_was_kept_and_lost_in_words_and_as_json(tmp_path, capsys):
     path, good = own_log(tmp_path / "run.mcap", 1000), tmp_path / "good.mcap"
     path.write_bytes(path.read_bytes()[:20000])
     assert main(["repair", str(path), "-o", str(good)]) == 3

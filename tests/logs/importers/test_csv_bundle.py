@@ -1,4 +1,4 @@
-"""The CSV bundle: what is written is what is measured, to the nanosecond, and mistakes are told by file and line."""
+"""The CSV bundle: what is written is what was measured to the nanosecond; mistakes are reported by file and line."""
 
 import math
 
@@ -138,7 +138,7 @@ def test_any_table_may_be_missing(bundle, name):
         ("ticks.csv", "time_s,left,right\n1,nan,2\n", r"ticks\.csv:2: left is 'nan', not a whole number"),
     ],
 )
-def test_mistake_is_told_by_file_and_line(bundle, name, text, message):
+def test_mistake_is_reported_by_file_and_line(bundle, name, text, message):
     (bundle / name).write_text(text, encoding="utf-8")
     with pytest.raises(RecordingError, match=message):
         imported(bundle)

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from fusion import Gyro, World
+from fusion import Gyro
 from fusion.errors import ParameterError
 from logs.importers.rosbag import read_bag
 from logs.messages import CODECS
 from logs.schemas import SCHEMAS
+from tests.worlds import empty_world
 
 SECOND = 1_000_000_000
 T = 1_652_380_260_171_842_098
-WORLD = World.from_table({"bounds": {"x_min": 0, "x_max": 9, "y_min": 0, "y_max": 9}})
+WORLD = empty_world()
 HEADING = 0.5
 XYZW = dict(zip("xyzw", (0.0, 0.0, math.sin(0.25), math.cos(0.25)), strict=True))
 PLACE = {"x": 1.1, "y": 2.2, "z": 3.3}
@@ -147,7 +148,7 @@ def test_truth_keeps_every_digit_and_a_missing_rotation_is_no_heading(tmp_path, 
         ("protobuf", b"\xff\xff"),
     ],
 )
-def test_message_that_says_nothing_is_counted(tmp_path, encoding, damaged):
+def test_message_without_content_is_counted(tmp_path, encoding, damaged):
     kind = "foxglove.PoseInFrame"
     path = written(tmp_path / "run.mcap", encoding, kind, damaged, PACKED[encoding](kind, T))
     run = read_bag(path, WORLD, {"truth": "/pose"})

@@ -71,7 +71,7 @@ def test_dead_reckoning_agrees_with_the_published_figure(imported, kind, name):
 
 @needs_data
 @pytest.mark.parametrize(("kind", "count"), [("tuc", 1), ("plaza", 1), ("cdoa", 7), ("kolakowski", 3), ("haiyao", 8)])
-def test_every_run_is_found_in_time_order_and_says_where_its_numbers_come_from(imported, kind, count):
+def test_every_run_is_found_in_time_order_and_states_where_its_numbers_come_from(imported, kind, count):
     runs = imported(kind)
     assert len(runs) == count
     for run in runs.values():

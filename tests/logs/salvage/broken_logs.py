@@ -10,14 +10,15 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from fusion import Gyro, World
+from fusion import Gyro
 from logs.cli.repair import mend
 from logs.salvage.scan import Salvage
 from logs.writer import RunWriter
+from tests.worlds import empty_world
 
 SECOND = 1_000_000_000
 HOUR = 3600 * SECOND
-WORLD = World.from_table({"name": "here", "bounds": {"x_min": 0, "x_max": 1, "y_min": 0, "y_max": 1}})
+WORLD = empty_world(name="here")
 CODECS = [CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD]
 PLACEHOLDER = b"\x06" + b"\xff" * 8 + bytes(40)
 """The head of a chunk that a streaming writer was about to fill: its length is not known yet."""

@@ -100,7 +100,7 @@ def test_chunk_whose_length_is_damaged_is_passed_by_the_index(tmp_path):
     assert repaired.damage.missing == 4
 
 
-def test_last_chunk_damaged_ends_where_the_index_says(tmp_path):
+def test_last_chunk_damaged_ends_where_the_index_ends_it(tmp_path):
     path = write_mcap(tmp_path / "run.mcap")
     start = indexed(path).chunk_indexes[-1].chunk_start_offset
     path.write_bytes(flipped(path.read_bytes(), 8 * (start + 60)))
@@ -115,7 +115,7 @@ def test_channels_lost_with_the_first_chunk_come_from_the_index(tmp_path):
     path.write_bytes(flipped(path.read_bytes(), 8 * (start + 60)))
     repaired = repair(path, tmp_path / "good.mcap")
     assert seen(tmp_path / "good.mcap") == list(range(4, 20))
-    assert repaired.damage.seconds_lost is None  # nothing says when the first one began
+    assert repaired.damage.seconds_lost is None  # nothing states when the first one began
     assert {channel.topic for channel in indexed(tmp_path / "good.mcap").channels.values()} == {"/a", "/b"}
 
 
@@ -163,9 +163,9 @@ def test_attachment_and_metadata_come_through_and_a_damaged_attachment_does_not(
     with (tmp_path / "good.mcap").open("rb") as stream:
         reader = make_reader(stream)
         assert [attachment.data for attachment in reader.iter_attachments()] == [b"scale 1.02"]
-        about, told = reader.iter_metadata()
+        about, loss = reader.iter_metadata()
         assert (about.name, about.metadata) == ("site", {"robot": "r2"})
-        assert told.name == "fusion repair"
+        assert loss.name == "fusion repair"
     path.write_bytes(path.read_bytes().replace(b"scale 1.02", b"scale 1.03"))
     repair(path, tmp_path / "other.mcap")
     assert indexed(tmp_path / "other.mcap").attachment_indexes == []

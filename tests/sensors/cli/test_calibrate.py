@@ -108,7 +108,7 @@ def test_ready_made_increments_are_judged_and_fill_no_world(drive, tmp_path, cap
     with RunWriter(path, run.world, name="made") as writer:
 
         def write(from_ns, time_ns, distance_m, turn_rad, measured):
-            writer.write(Odometry(time_ns, "encoders", time_ns, from_ns, distance_m, turn_rad, measured))
+            writer.write(Odometry(time_ns, "encoders", time_ns // 1_000_000, from_ns, distance_m, turn_rad, measured))
 
         for ticks in run.measurements:
             odometer.advance(ticks, write)
