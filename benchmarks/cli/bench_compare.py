@@ -13,7 +13,7 @@ from benchmarks.runner.results import Result, comparison, require_metric
 from benchmarks.runner.suite import CLEAN
 from fusion import ParameterError
 from fusion.errors import did_you_mean
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     judged = comparison(chosen, arguments.metric, arguments.fault)
     for verdict in judged.verdicts:
         sys.stdout.write(f"{verdict.sentence}\n")
-    print_sheets([pair_table(judged)])
+    print_tables([pair_table(judged)])
     return 0
 
 

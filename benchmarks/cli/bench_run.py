@@ -15,7 +15,7 @@ from benchmarks.runner.scoring import ALIVE
 from benchmarks.runner.suite import CLEAN
 from fusion.cli.arguments import at_least_one
 from fusion.output.progress import progress_bar
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 
 
 def lost(results: Sequence[Result]) -> list[str]:
@@ -68,5 +68,5 @@ def run(arguments: argparse.Namespace) -> int:
     )
     for reason in (*warnings(results), *lost(results), *remarks(results)):
         sys.stderr.write(f"fusion bench run: {reason}\n")
-    print_sheets([suite_leaderboard(results)])
+    print_tables([suite_leaderboard(results)])
     return 0 if any(result.status in ALIVE for result in results) else 1

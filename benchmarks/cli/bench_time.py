@@ -9,7 +9,7 @@ from benchmarks.cli.suite_arguments import opened, suite_options
 from benchmarks.runner.timing import REPEATS, TIMING_FILE, Timing, Untimed, machine, measure
 from fusion.cli.arguments import at_least_one
 from fusion.output.files import write_json
-from fusion.output.tables import Sheet, print_sheets
+from fusion.output.tables import Table, print_tables
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -29,9 +29,9 @@ def run(arguments: argparse.Namespace) -> int:
     for one in untimed:
         sys.stderr.write(f"fusion bench time: {one.estimator} has no time: {one.why}\n")
     head = ("µs per measurement", "least", "q25", "q75", "p50", "p95", "p99", "max", "CPU s per log s", "peak MB")
-    print_sheets(
+    print_tables(
         [
-            Sheet(
+            Table(
                 "Alone on this machine: processor time, means over repeats and single measurements; memory",
                 head,
                 tuple(map(_row, timings)),

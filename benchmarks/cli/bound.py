@@ -10,11 +10,11 @@ from typing import get_args
 
 from benchmarks.limits.floor_picture import draw
 from benchmarks.limits.floor_plan import LIMIT_M, plan_site
-from benchmarks.limits.floor_tables import sheets, write_record
+from benchmarks.limits.floor_tables import tables, write_record
 from fusion.cli.arguments import at_least_one
 from fusion.output.figures import require_matplotlib
 from fusion.output.progress import progress_bar
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 from fusion.radio import RadioKind
 
 
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     for remark in plan.remarks:
         sys.stderr.write(f"fusion bound: {remark}\n")
     if arguments.json != Path("-"):
-        print_sheets(sheets(plan))
+        print_tables(tables(plan))
     if arguments.json is not None:
         write_record(plan, arguments.json)
     if arguments.png is not None:

@@ -28,7 +28,7 @@ from benchmarks.runner.suite_file import load_suite
 from fusion import FusionError, ViewerError
 from fusion.cli.arguments import not_negative
 from fusion.output.files import write
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 from fusion.plugins import left_out
 from logs.run import Run
 from sensors.simulation.simulate import simulate
@@ -136,7 +136,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Make the demo, print its table, show it, and say what to try next. Exit code 1 when no estimator survived."""
     made = demo(arguments.output, seed=arguments.seed)
-    print_sheets(tables(made.results))
+    print_tables(tables(made.results))
     for path in (made.log, made.records, made.drawn.scene, made.drawn.picture, made.page):
         if path is not None:
             sys.stdout.write(f"{path}\n")

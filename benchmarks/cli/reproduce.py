@@ -17,7 +17,7 @@ from fusion.cli.arguments import at_least_one, not_negative
 from fusion.output.figures import require_matplotlib
 from fusion.output.files import require_place, write_json
 from fusion.output.progress import progress_bar
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 from fusion.plugins import left_out
 
 Writer = Callable[[Report, Path], object]
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     for remark in (*(left_out() if arguments.estimators is None else ()), *report.remarks):
         _tell(remark)
-    print_sheets(list(report.sheets.values()))
+    print_tables(list(report.tables.values()))
     sys.stdout.write(f"{in_words(report.judged)}\n")
     for path, writer in writers:
         writer(report, path)

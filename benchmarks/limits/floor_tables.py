@@ -9,13 +9,13 @@ from pathlib import Path
 from benchmarks.limits.anchor_placement import Proposal, Spread
 from benchmarks.limits.floor_plan import Plan, title
 from fusion.output.files import write_json
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 
 MOST_LOSSES = 12
 """Anchors in the table of what the loss of one costs; the record has them all."""
 
 
-def sheets(plan: Plan) -> list[Sheet]:
+def tables(plan: Plan) -> list[Table]:
     """What the floor allows, what the loss of an anchor costs, and the best changes found."""
     # Of many anchors those that would be missed most: nobody reads a hundred lines that say 1.00.
     vital = sorted(plan.losses, key=lambda name: -plan.losses[name].p95_m)[:MOST_LOSSES]
@@ -26,14 +26,14 @@ def sheets(plan: Plan) -> list[Sheet]:
     )
     worst = f" (the worst {len(vital)} of {len(plan.losses)})" if len(vital) < len(plan.losses) else ""
     found = [
-        Sheet(title(plan), ("over the floor", ""), tuple(_floor_rows(plan))),
-        Sheet(f"When one anchor falls silent{worst}", ("silent", "median m", "p95 m", "worst m", "p95 times"), losses),
+        Table(title(plan), ("over the floor", ""), tuple(_floor_rows(plan))),
+        Table(f"When one anchor falls silent{worst}", ("silent", "median m", "p95 m", "worst m", "p95 times"), losses),
     ]
     if plan.proposals:
         rows = tuple(
             (describe(plan, each), *_errors(each.spread), _number(gain_m(plan, each))) for each in plan.proposals
         )
-        found.append(Sheet("The best change", ("change", "median m", "p95 m", "worst m", "p95 gain m"), rows))
+        found.append(Table("The best change", ("change", "median m", "p95 m", "worst m", "p95 gain m"), rows))
     return found
 
 

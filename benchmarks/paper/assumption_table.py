@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.interpretations import literal
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 from sensors.simulation.scenario import Scenario
 
 PAPER, CHOSEN, CALIBRATED, READ = "paper", "chosen", "calibrated", "open, read so"
@@ -68,9 +68,9 @@ ROWS: tuple[Row, ...] = (
 )
 
 
-def assumptions(outcomes: Sequence[Outcome]) -> Sheet:
+def assumptions(outcomes: Sequence[Outcome]) -> Table:
     """One row per assumption, one column per environment."""
     rows = [(name, source, *(tell(outcome.scenario) for outcome in outcomes)) for name, source, tell in ROWS]
     rows += [(name, READ, *([str(value)] * len(outcomes))) for name, value in literal().options.items()]
     head = ("assumption", "from", *(outcome.environment.short for outcome in outcomes))
-    return Sheet("Every assumption", head, tuple(rows), prose=True)
+    return Table("Every assumption", head, tuple(rows), prose=True)

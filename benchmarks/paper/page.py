@@ -31,7 +31,7 @@ def markdown(report: Report, figure_link: Callable[[str], str]) -> str:
     def filled(place: re.Match[str]) -> str:
         kind, name = place.groups()
         if kind == "table":
-            return as_markdown(report.sheets[name])
+            return as_markdown(report.tables[name])
         if kind == "figure":
             return f"![{(FIGURES[name].__doc__ or name).splitlines()[0]}]({figure_link(name)})"
         return told[name]

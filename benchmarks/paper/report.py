@@ -18,7 +18,7 @@ from benchmarks.paper.interpretations import ORIGINS_M
 from benchmarks.paper.outlier_rule_examples import lock_out_example, origin_example
 from benchmarks.paper.summary import Spread
 from fusion.arrays import Floats
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 
 
 class Report(NamedTuple):
@@ -27,13 +27,13 @@ class Report(NamedTuple):
     outcomes: tuple[Outcome, ...]
     judged: tuple[Judged, ...]
     ranked: tuple[Ranked, ...]
-    sheets: Mapping[str, Sheet]
+    tables: Mapping[str, Table]
 
     @classmethod
     def of(cls, outcomes: Sequence[Outcome]) -> Report:
         """Everything that follows from the outcomes."""
         judged, ranked, matter = judge(outcomes), rank(outcomes), effects(outcomes)
-        sheets = {
+        by_name = {
             "maxima": tables.maxima(outcomes),
             "verdicts": tables.verdicts(judged, outcomes),
             "reasons": tables.reasons(judged),
@@ -48,7 +48,7 @@ class Report(NamedTuple):
             "alternatives": tables.alternatives(outcomes),
             "assumptions": assumptions(outcomes),
         }
-        return cls(tuple(outcomes), tuple(judged), tuple(ranked), sheets)
+        return cls(tuple(outcomes), tuple(judged), tuple(ranked), by_name)
 
     @property
     def remarks(self) -> list[str]:

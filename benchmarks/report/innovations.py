@@ -10,7 +10,7 @@ from benchmarks.metrics.innovations import NAMES, Banded, mean_nis
 from benchmarks.report.cell_links import link
 from benchmarks.report.report_data import ReportData
 from benchmarks.runner.results import by_estimator, median_metrics
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 
 
 def nis_of_cells(data: ReportData) -> dict[tuple[str, str], dict[str, Banded]]:
@@ -18,12 +18,12 @@ def nis_of_cells(data: ReportData) -> dict[tuple[str, str], dict[str, Banded]]:
     return {key: mean_nis(series.fates) for key, series in data.series.items() if series.is_scored}
 
 
-def innovations(data: ReportData) -> Sheet:
+def innovations(data: ReportData) -> Table:
     """One row for each estimator and sensor, one column for each shown run: a mean outside its band is bold."""
     found = nis_of_cells(data)
     head = ("estimator", "sensor", "inside 95 %, median", *data.scored_runs)
     title = "Innovations: mean NIS [band of an honest filter, 95 %]; above: surer of its readings than right"
-    return Sheet(title, head, tuple(_rows(data, found)))
+    return Table(title, head, tuple(_rows(data, found)))
 
 
 def _rows(data: ReportData, found: dict[tuple[str, str], dict[str, Banded]]) -> Iterator[tuple[str, ...]]:

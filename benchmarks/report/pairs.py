@@ -10,10 +10,10 @@ from benchmarks.runner.leaderboard import pair_table
 from benchmarks.runner.results import Result, by_estimator, by_run, score_matrix
 from benchmarks.statistics.paired_tests import log_ratios
 from benchmarks.statistics.verdict import Comparison, Verdict
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 
 
-def run_by_run(data: ReportData) -> Sheet:
+def run_by_run(data: ReportData) -> Table:
     """What every estimator scored in every run: what the verdicts are made of."""
     grouped = by_estimator(data.results)
     rows = []
@@ -28,10 +28,10 @@ def run_by_run(data: ReportData) -> Sheet:
     over = ", median over seeds" if data.suite.seeds > 1 else ""
     unit = f" [{data.unit.name}]" if data.unit.name else ""
     title = f"Run by run: {data.metric}{unit} without faults{over}"
-    return Sheet(title, ("run", *data.estimators), tuple(rows))
+    return Table(title, ("run", *data.estimators), tuple(rows))
 
 
-def pairs(data: ReportData, comparison: Comparison) -> Sheet:
+def pairs(data: ReportData, comparison: Comparison) -> Table:
     """Every pair as one row; the ratio leads to the cell that decided most."""
     table = pair_table(comparison)
     rows = [

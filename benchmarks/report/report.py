@@ -25,7 +25,7 @@ from benchmarks.runner.suite import CLEAN, TUNE
 from benchmarks.statistics.block_bootstrap import LEAST_INSTANTS, within_run
 from fusion.output.figures import require_matplotlib
 from fusion.output.html import as_html
-from fusion.output.tables import Sheet, as_code, as_markdown
+from fusion.output.tables import Table, as_code, as_markdown
 
 WITHIN_RUN = ("pos_p75", 0.75)
 """The quantile that is compared within one run; its instants have no other score."""
@@ -137,15 +137,15 @@ def _under_faults(data: ReportData) -> Iterator[str]:
         yield _table(tables.credibility(data), "credibility")
 
 
-def _table(sheet: Sheet, name: str = "") -> str:
+def _table(table: Table, name: str = "") -> str:
     """A table with what there is to know of it."""
-    return as_markdown(sheet) + (f"\n\n{NOTES[name]}" if name else "")
+    return as_markdown(table) + (f"\n\n{NOTES[name]}" if name else "")
 
 
-def _known(sheet: Sheet, name: str = "") -> Iterator[str]:
+def _known(table: Table, name: str = "") -> Iterator[str]:
     """The same, where it has rows."""
-    if sheet.rows:
-        yield _table(sheet, name)
+    if table.rows:
+        yield _table(table, name)
 
 
 def _figure(data: ReportData, name: str) -> Iterator[str]:

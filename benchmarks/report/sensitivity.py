@@ -22,7 +22,7 @@ from benchmarks.runner.suite import CLEAN, TEST, TUNE, EstimatorSpec
 from benchmarks.statistics.paired_tests import log_ratios, mean_interval
 from fusion.arrays import Flags, Floats
 from fusion.output.figures import plain_colour, plain_ticks
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 from fusion.plugins import parameters
 
 WITHOUT_TUNE = (
@@ -106,7 +106,7 @@ def _cells(data: ReportData, ids: Sequence[str]) -> list[list[Result]]:
     return list(by_run(own).values())
 
 
-def sensitivity(data: ReportData, found: Sequence[Sweep]) -> Sheet:
+def sensitivity(data: ReportData, found: Sequence[Sweep]) -> Table:
     """Each value as a multiple of what it is compared with: geometric mean over runs with its paired t interval. It
     leads to the run in which the value makes the greatest difference.
     """
@@ -121,7 +121,7 @@ def sensitivity(data: ReportData, found: Sequence[Sweep]) -> Sheet:
         for place in range(len(sweep.values))
     ]
     title = f"Parameters: {data.metric} as a multiple of the default's (else of the first value's), [95 %]"
-    return Sheet(title, ("estimator", "parameter", "value", "tune runs", "test runs"), tuple(rows))
+    return Table(title, ("estimator", "parameter", "value", "tune runs", "test runs"), tuple(rows))
 
 
 def _linked(data: ReportData, sweep: Sweep, place: int, of: Flags) -> str:

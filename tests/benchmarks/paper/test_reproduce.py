@@ -163,7 +163,7 @@ def test_gyro_turns_are_nearer_the_truth_than_wheel_turns():
 def test_page_has_every_table_and_figure_and_leaves_no_place_open(report):
     text = markdown(report, lambda name: f"{name}.png")
     assert "{{" not in text
-    assert all(as_markdown(sheet) in text for sheet in report.sheets.values())
+    assert all(as_markdown(table) in text for table in report.tables.values())
     assert all(f"]({name}.png)" in text for name in FIGURES)
     assert "cannot tell from 2 runs" in text
     assert f"{in_words(report.judged)} How often" in text
@@ -185,8 +185,8 @@ def test_command_prints_tables_and_writes_what_is_asked(report, tmp_path, monkey
     )
     assert (asked["trials"], asked["seed"], asked["estimators"]) == (2, 5, ["ekf"])
     out = capsys.readouterr().out
-    for sheet in report.sheets.values():
-        assert sheet.title.split(":")[0] in out
+    for table in report.tables.values():
+        assert table.title.split(":")[0] in out
     assert f"\n{in_words(report.judged)}\n" in out
     assert json.loads(files["json"].read_text()) == json.loads(json.dumps(report.record(), allow_nan=False))
     assert files["png"].read_bytes().startswith(b"\x89PNG")
@@ -194,7 +194,7 @@ def test_command_prints_tables_and_writes_what_is_asked(report, tmp_path, monkey
     html = files["html"].read_text()
     assert html.count("data:image/png;base64,") == len(FIGURES)
     assert not re.search(r'(src|href)="(?!data:)', html)
-    assert html.count("<table>") == html.count("</table>") > len(report.sheets)
+    assert html.count("<table>") == html.count("</table>") > len(report.tables)
 
 
 def test_file_that_cannot_be_written_is_told_before_any_work(tmp_path, capsys):

@@ -24,7 +24,7 @@ from benchmarks.runner.timing import measure
 from benchmarks.runner.verify import differing
 from benchmarks.runner.workers import Limits
 from fusion.cli.main import main
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 
 HEAD = '[suite]\nname = "verbs"\n'
 RUNS = "".join(
@@ -330,4 +330,4 @@ def test_what_an_estimator_says_breaks_no_export():
     lost = SimpleNamespace(cell=cell, status="crashed", error="red \x1b[31m & <b>\x00")
     failure = ElementTree.fromstring(as_junit(SimpleNamespace(name="s"), [lost])).find("testcase/failure")
     assert failure.text == "red ?[31m & <b>?"
-    assert rb"a\{b\}\_1 & \textbackslash{}" in as_latex(Sheet("sizes", ("a{b}_1", "\\"), ()))
+    assert rb"a\{b\}\_1 & \textbackslash{}" in as_latex(Table("sizes", ("a{b}_1", "\\"), ()))
