@@ -15,6 +15,7 @@ from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.matching import Answers, match
 from benchmarks.metrics.metric import Unit
 from benchmarks.runner.execute import stored_track
+from benchmarks.runner.reference import reference_of
 from benchmarks.runner.results import Result, by_estimator, comparison, judged, median_metrics
 from benchmarks.runner.run_source import open_run
 from benchmarks.runner.scoring import ALIVE
@@ -26,9 +27,8 @@ from fusion import ParameterError, Ranges
 from fusion.arrays import Floats
 from fusion.radio import RadioKind
 from fusion.values import NANOSECONDS
-from logs.prior import begin_ns
 from logs.run import Run
-from logs.truth import Instants, evaluation_instants
+from logs.truth import Instants
 
 SHOWN_RUNS = 6
 """Runs that get panels of their own."""
@@ -72,7 +72,6 @@ class ReportData:
         self.suite, self.results, self.metric = suite, list(results), metric
         self._store = store
         self._runs: dict[str, Run] = {}
-        self._starts_ns: dict[str, int] = {}
 
     @property
     def words(self) -> list[str]:
@@ -170,19 +169,12 @@ class ReportData:
             self._runs[run_id] = open_run(self.suite.run(run_id), self.suite.folder)
         return self._runs[run_id]
 
-    def _start_ns(self, run_id: str) -> int:
-        if run_id not in self._starts_ns:
-            self._starts_ns[run_id] = begin_ns(self.run(run_id).measurements)
-        return self._starts_ns[run_id]
-
     def _series(self, result: Result) -> Series:
-        cell, rules = result.cell, result.cell.evaluation
-        truth = self.run(cell.run.id).truth
-        assert truth is not None
-        instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
+        cell = result.cell
+        _, instants, start_ns = reference_of(cell, self._store)
         track, fates = stored_track(cell, self._store)
-        answers = match(instants, track, max_age_s=rules.max_age_s)
-        return Series(result, self._start_ns(cell.run.id), instants, answers, fates)
+        answers = match(instants, track, max_age_s=cell.evaluation.max_age_s)
+        return Series(result, start_ns, instants, answers, fates)
 
 
 def _ids(result: Result) -> tuple[str, str, str, int]:

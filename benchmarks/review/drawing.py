@@ -16,12 +16,13 @@ from benchmarks.review.columns import DrawnTrack, EstimateColumns
 from benchmarks.review.events import Events, States, events, states
 from benchmarks.review.folding import Reviewed
 from benchmarks.runner.leaderboard import Entry, rank
+from benchmarks.runner.reference import Reference
 from benchmarks.runner.scoring import Score
 from fusion import Decision, Reason, Update
 from fusion.arrays import Floats, Whole
 from fusion.output.colours import Colour, colour_of
 from logs.run import Run
-from logs.truth import Instants, evaluation_instants, wrap_angles
+from logs.truth import Instants, wrap_angles
 
 SHOWN = 6
 """Tracks that are switched on, the best ones: more cannot be told apart. The eye beside an entity shows the others."""
@@ -135,15 +136,15 @@ class Drawing:
 
 def drawings(run: Run, reviewed: Sequence[Reviewed]) -> list[Drawing]:
     """The estimators with their scores, the best first. A counterfactual is shown where its estimator is."""
-    instants = None if run.truth is None else evaluation_instants(run.truth)
+    instants = Reference.of(run).instants
     ranking = sorted(reviewed, key=lambda one: rank(entry_of(one)))
     best = [one.name for one in ranking if one.counterfactual_of is None][:SHOWN]
     return [_drawing(one, instants, shown=(one.counterfactual_of or one.name) in best) for one in ranking]
 
 
-def _drawing(reviewed: Reviewed, instants: Instants | None, *, shown: bool) -> Drawing:
+def _drawing(reviewed: Reviewed, instants: Instants, *, shown: bool) -> Drawing:
     made, scored = reviewed.made, reviewed.score
-    if instants is None or scored.errors is None or made.error is not None:
+    if scored.errors is None or made.error is not None:
         return Drawing(reviewed, shown, None, None)
     return Drawing(reviewed, shown, instants, match(instants, made.track))
 
