@@ -25,7 +25,7 @@ from logs.run import Run
 from logs.truth import Instants, wrap_angles
 
 SHOWN = 6
-"""Tracks that are switched on, the best ones: more cannot be told apart. The eye beside an entity shows the others."""
+"""Tracks that are switched on, the best ones; the eye beside an entity shows the others."""
 
 
 class SignedErrors(NamedTuple):
@@ -74,7 +74,7 @@ class Drawing:
 
     @property
     def is_counterfactual(self) -> bool:
-        """Whether it shows what would have been, and is drawn thin."""
+        """Whether it is of a run that did not happen, and is drawn thin."""
         return self.reviewed.counterfactual_of is not None
 
     @property
@@ -89,12 +89,12 @@ class Drawing:
 
     @cached_property
     def estimates(self) -> EstimateColumns:
-        """What it claims of itself."""
+        """Its estimates, as columns."""
         return EstimateColumns.of_updates(self.final)
 
     @property
     def fates(self) -> FateColumns:
-        """What became of the readings."""
+        """The final fates of the readings."""
         return self.reviewed.made.fates
 
     @cached_property
@@ -104,22 +104,22 @@ class Drawing:
 
     @cached_property
     def states(self) -> States:
-        """When its state changed."""
+        """Its changes of state."""
         return states(self.estimates, self.fates, self.fate_update)
 
     @cached_property
     def events(self) -> Events:
-        """What happened to it."""
+        """Its events."""
         return events(self.final, self.estimates, self.fates)
 
     @cached_property
     def gates(self) -> bool:
         """Whether it uses radio at all, so that there is a weight to show; of a counterfactual none is shown."""
-        unheard = self.fates.met(Reason.KIND_NOT_CONSUMED) | self.fates.met(Decision.LATE)  # which may be of anything
-        return not self.is_counterfactual and not bool(unheard.all())
+        unused = self.fates.met(Reason.KIND_NOT_CONSUMED) | self.fates.met(Decision.LATE)  # which may be of anything
+        return not self.is_counterfactual and not bool(unused.all())
 
     @cached_property
-    def tells_nis(self) -> bool:
+    def has_nis(self) -> bool:
         """Whether any reading has an NIS."""
         return bool(np.isfinite(self.fates.nis).any())
 

@@ -1,4 +1,4 @@
-"""What the motion sensors said, before anybody made sense of it: speeds and turn rates over time."""
+"""Raw data of the motion sensors: speeds and turn rates over time, and events of the devices."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ LEVELS = {Level.OK: "INFO", Level.WARN: "WARN", Level.ERROR: "ERROR"}
 
 
 def worth_a_line(run: Run) -> Sequence[Diagnostic]:
-    """Diagnostics that are no routine: what is told each second, or beside each scan, is left out."""
+    """Diagnostics that are no routine: those that come each second, or beside each scan, are left out."""
     return [r for r in run.diagnostics if r.text == OPENED or (r.level is not Level.OK and r.text != STATUS)]
 
 
