@@ -1,4 +1,4 @@
-"""Every assumption by name: what is the paper's, what was chosen by hand, what was calibrated."""
+"""Every assumption by name: those of the paper, those chosen by hand, those calibrated."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ ROWS: tuple[Row, ...] = (
     ("direction of the wheels is known", CHOSEN, lambda s: "yes" if s.world.robot.encoder == "quadrature" else "no"),
     ("start: place known to, cm, and heading to, rad", CHOSEN, _start),
     ("distance counted too long, %", CALIBRATED, lambda s: f"{100.0 * s.reality.distance_scale_bias:.2f}"),
-    ("track wider than told, %", CALIBRATED, lambda s: f"{100.0 * s.reality.track_scale_bias:.2f}"),
+    ("track wider than stated, %", CALIBRATED, lambda s: f"{100.0 * s.reality.track_scale_bias:.2f}"),
     ("wheel slip each half second, σ, %", CALIBRATED, lambda s: f"{100.0 * s.reality.slip_std:.2f}"),
     ("shadowing χ, σ, dB", CALIBRATED, lambda s: f"{s.reality.shadowing_std_db:.2f}"),
     ("shadowing is alike over, m", CHOSEN, lambda s: f"{s.reality.shadowing_length_m:g}"),
@@ -70,7 +70,7 @@ ROWS: tuple[Row, ...] = (
 
 def assumptions(outcomes: Sequence[Outcome]) -> Table:
     """One row per assumption, one column per environment."""
-    rows = [(name, source, *(tell(outcome.scenario) for outcome in outcomes)) for name, source, tell in ROWS]
+    rows = [(name, source, *(value(outcome.scenario) for outcome in outcomes)) for name, source, value in ROWS]
     rows += [(name, READ, *([str(value)] * len(outcomes))) for name, value in literal().options.items()]
     head = ("assumption", "from", *(outcome.environment.short for outcome in outcomes))
     return Table("Every assumption", head, tuple(rows), prose=True)

@@ -73,7 +73,7 @@ def verdicts(judged: Sequence[Judged], outcomes: Sequence[Outcome]) -> Table:
 
 
 def reasons(judged: Sequence[Judged]) -> Table:
-    """How every claim is measured, and what decides it."""
+    """The measure of every claim, and the reasons of its verdict."""
     rows = tuple((each.claim.text, each.claim.measured_as, each.reason) for each in judged)
     return Table("Claims: how each is measured, and why", ("claim", "holds in a run when", "reason"), rows, prose=True)
 
@@ -141,19 +141,19 @@ RECORDED_STD_DB = 4.45
 
 
 def bounds(outcomes: Sequence[Outcome]) -> Table:
-    """What is physically possible for a radio fix."""
+    """The physical limit of a radio fix."""
     rows = []
     for outcome in outcomes:
-        told_db = outcome.scenario.world.anchors[0].radio.std
+        stated_db = outcome.scenario.world.anchors[0].radio.std
         limit_m, fix_m = bound_rms_m(outcome), _rmse(outcome, WIFI)
         rows.append(
             (
                 outcome.environment.title,
-                f"{told_db:.2f}",
+                f"{stated_db:.2f}",
                 cm(limit_m),
                 cm(fix_m),
                 f"{limit_m / fix_m:.2f}",
-                cm(limit_m * RECORDED_STD_DB / told_db),
+                cm(limit_m * RECORDED_STD_DB / stated_db),
             )
         )
     head = ("", "σ, dB", "bound, cm", "Wi-Fi alone, cm", "efficiency", f"bound at {RECORDED_STD_DB:g} dB, cm")
@@ -176,8 +176,8 @@ def alternatives(outcomes: Sequence[Outcome]) -> Table:
             )
     head = ("filling", "odometry", "Wi-Fi", *(f"% of\n{scale}" for scale in SCALES), EKF)
     title = (
-        "Other fillings: largest error, cm. Of the proposed method, read in four ways, and of the EKF: the median, and "
-        "how often it beats odometry and Wi-Fi"
+        "Other fillings: largest error, cm. Of the proposed method, interpreted in four ways, and of the EKF: the "
+        "median, and how often it beats odometry and Wi-Fi"
     )
     return Table(title, head, tuple(rows))
 
@@ -192,32 +192,38 @@ def filling_curves(outcome: Outcome, key: str) -> Mapping[str, Floats]:
     if key != MAIN.key:
         return outcome.alternatives[key]
     own = {estimator: outcome.largest(estimator) for estimator in (ODOMETRY, WIFI, EKF)}
-    return own | {scale: outcome.readings[:, literal_of_scale(scale)] for scale in SCALES}
+    return own | {scale: outcome.interpretations[:, literal_of_scale(scale)] for scale in SCALES}
 
 
-def readings(ranked: Sequence[Ranked], outcomes: Sequence[Outcome], shown: int = 8) -> Table:
-    """The readings closest to the paper, the literal one wherever it stands, and the furthest."""
-    places = sorted({*range(shown), [r.reading for r in ranked].index(literal()), len(ranked) - 1})
+def interpretations(ranked: Sequence[Ranked], outcomes: Sequence[Outcome], shown: int = 8) -> Table:
+    """The interpretations closest to the paper, the literal one wherever it stands, and the furthest."""
+    places = sorted({*range(shown), [r.interpretation for r in ranked].index(literal()), len(ranked) - 1})
     rows = []
     for place in places:
         each = ranked[place]
-        name = f"{place + 1}. {each.reading}" + (" (the defaults)" if each.reading == literal() else "")
-        found = (f"{cm(m)} ({100 * b.value:.0f} %)" for m, b in zip(each.medians_m, each.beats_both, strict=True))
-        rows.append((name, f"{each.factor:.2f}", *found))
+        name = f"{place + 1}. {each.interpretation}" + (" (the defaults)" if each.interpretation == literal() else "")
+        cells = (f"{cm(m)} ({100 * b.value:.0f} %)" for m, b in zip(each.medians_m, each.beats_both, strict=True))
+        rows.append((name, f"{each.factor:.2f}", *cells))
     published = ("published", "1", *(cm(outcome.environment.proposed_max_m) for outcome in outcomes))
-    head = ("reading: outlier in percent ...", "off by factor", *(f"{o.environment.short}, cm" for o in outcomes))
-    title = f"{len(ranked)} readings of the algorithm: median largest error, and in brackets how often it beats both"
+    head = (
+        "interpretation: outlier in percent ...",
+        "off by factor",
+        *(f"{o.environment.short}, cm" for o in outcomes),
+    )
+    title = (
+        f"{len(ranked)} interpretations of the algorithm: median largest error, and in brackets how often it beats both"
+    )
     return Table(title, head, (published, *rows))
 
 
-def effects(found: Sequence[Effect], outcomes: Sequence[Outcome]) -> Table:
-    """How much each open option matters."""
+def effects(by_option: Sequence[Effect], outcomes: Sequence[Outcome]) -> Table:
+    """Effect of each open option."""
     rows = []
-    for option, medians, ratio in found:
+    for option, medians, ratio in by_option:
         rows += [(f"{option} = {value}", *map(cm, row)) for value, row in medians.items()]
         rows.append((f"{option}: largest / smallest", *(f"{each:.2f}" for each in ratio)))
     head = ("median largest error, cm, geometric mean over all other options", *(o.environment.short for o in outcomes))
-    return Table("How much each open reading matters", head, tuple(rows))
+    return Table("Effect of each open option", head, tuple(rows))
 
 
 def origins(outcomes: Sequence[Outcome]) -> Table:

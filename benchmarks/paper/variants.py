@@ -1,4 +1,4 @@
-"""One run told in other ways: with its gyro, leg by leg, with another origin, with scans that miss an access point."""
+"""One run in other forms: with its gyro, leg by leg, with another origin, with scans that miss an access point."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from logs.run import Run
 from sensors.simulation.scenario import Reality
 
 MISSING_SHARE = 0.2
-"""How often a scan lacks one access point, in the variant with missing Wi-Fi."""
+"""Share of scans that lack one access point, in the variant with missing Wi-Fi."""
 
 
 def without_gyro(run: Run) -> Run:
@@ -24,7 +24,7 @@ def without_gyro(run: Run) -> Run:
 
 
 def with_gyro(run: Run, reality: Reality) -> Run:
-    """The run of a robot that takes its turns from the gyro, and is told how good that is."""
+    """The run of a robot that takes its turns from the gyro, and knows how good that is."""
     table: dict[str, Any] = json.loads(run.world.table)
     table["robot"]["turn_source"] = "gyro"
     table["robot"]["noise"] |= {
@@ -44,7 +44,7 @@ def leg_by_leg(run: Run) -> Run:
     even to the distance travelled; it is some fifty times shorter.
     """
     assert run.prior is not None
-    odometer, told = Odometer(run.world.robot), list[Measurement]()
+    odometer, measurements = Odometer(run.world.robot), list[Measurement]()
     state, motion, since_ns = odometer.start(run.prior.time_ns), Increment(), run.prior.time_ns
     for measurement in run.measurements:
         if isinstance(measurement, WifiScan | Ranges):
@@ -54,9 +54,9 @@ def leg_by_leg(run: Run) -> Run:
         for step in steps:
             motion = motion.extend(step, run.world.robot.noise)
         if isinstance(measurement, WifiScan):
-            told += [*_leg(motion, since_ns, measurement.time_ns), measurement]
+            measurements += [*_leg(motion, since_ns, measurement.time_ns), measurement]
             motion, since_ns = Increment(), measurement.time_ns
-    return replace(run, measurements=tuple(told))
+    return replace(run, measurements=tuple(measurements))
 
 
 def _leg(motion: Increment, from_ns: int, until_ns: int) -> list[Odometry]:
