@@ -1,4 +1,4 @@
-"""``fusion bench compare``: which estimator is better on these runs, or that they cannot tell."""
+"""``fusion bench compare``: which estimator is better on these runs, or that they are inconclusive."""
 
 from __future__ import annotations
 

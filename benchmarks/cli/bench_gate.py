@@ -1,5 +1,5 @@
-"""``fusion bench gate``: may this change land? Exit code 0 yes, 1 no, 2 wrong usage or suite, 3 not measured, 4 cannot
-tell, 5 not deterministic; of several the first of 2, 3, 5, 1, 4.
+"""``fusion bench gate``: may this change land? Exit code 0 yes, 1 no, 2 wrong usage or suite, 3 not measured, 4
+inconclusive, 5 not deterministic; of several the first of 2, 3, 5, 1, 4.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Judge, tell every finding, answer the gravest."""
+    """Judge, print every finding, answer the gravest."""
     try:
         findings = _findings(arguments)
     except FusionError as error:
@@ -59,15 +59,19 @@ def _findings(arguments: argparse.Namespace) -> list[Finding]:
         require_metric(metric, results)
     for metric in filter(more_is_better, suite.gate.ratio):
         raise SuiteError(f"gate.ratio.{metric}: more of it is better, so it may grow as it likes; give it a floor")
-    found = judge(results, suite.gate, read_baseline(named) if named else None)
+    findings = judge(results, suite.gate, read_baseline(named) if named else None)
     if suite.gate.ratio and named is None:
-        asked = ", ".join(suite.gate.ratio)
-        found.append(Finding(Outcome.NOT_MEASURED, f"gate.ratio ({asked}) compares with a baseline; give --baseline"))
-    found += [
+        why = f"gate.ratio ({', '.join(suite.gate.ratio)}) compares with a baseline; give --baseline"
+        findings.append(Finding(Outcome.NOT_MEASURED, why))
+    findings += [
         Finding(Outcome.NOT_DETERMINISTIC, f"{cell}: computed again, it differs")
         for cell in differing(cells, store, arguments.verify, Limits(suite.limits.wall_s, suite.limits.rss_mb))
     ]
-    found += [Finding(Outcome.CANNOT_TELL, sentence) for sentence in suite.left_out]
+    findings += [Finding(Outcome.INCONCLUSIVE, sentence) for sentence in suite.left_out]
     if suite.gate.inconclusive == "warn":
-        found = [one._replace(outcome=Outcome.PASS) if one.outcome is Outcome.CANNOT_TELL else one for one in found]
-    return found or [Finding(Outcome.NOT_MEASURED, "the suite's [gate] asks for nothing; give ratio or floor")]
+        findings = [_as_warning(finding) for finding in findings]
+    return findings or [Finding(Outcome.NOT_MEASURED, "the suite's [gate] asks for nothing; give ratio or floor")]
+
+
+def _as_warning(finding: Finding) -> Finding:
+    return finding._replace(outcome=Outcome.PASS) if finding.outcome is Outcome.INCONCLUSIVE else finding

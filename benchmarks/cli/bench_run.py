@@ -19,7 +19,7 @@ from fusion.output.tables import print_tables
 
 
 def lost(results: Sequence[Result]) -> list[str]:
-    """Why estimators have no score in some cells: a sentence for each status they ended with, and its first reason."""
+    """A sentence for each status with which estimators ended that have no score in some cells, and its first reason."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for one in results:
         if one.status not in ALIVE:
@@ -33,7 +33,7 @@ def _first(reasons: Sequence[str]) -> str:
 
 
 def remarks(results: Sequence[Result]) -> list[str]:
-    """Where the truth of a run has a heading at some instants only, one sentence for each run."""
+    """One sentence for each run whose truth has a heading at some instants only."""
     sentences = {one.run: partly_headed(one) for one in results if one.cell.fault.id == CLEAN}
     return [f"{run}: {sentence}" for run, sentence in sentences.items() if sentence]
 

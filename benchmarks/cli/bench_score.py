@@ -98,7 +98,7 @@ RELATIVE = (
 
 
 def tables(score: PairScore) -> Sequence[Table]:
-    """Position and heading, the relative pose errors, and what tells how far to trust them."""
+    """Position and heading, the relative pose errors, and the counts they rest on."""
     return _absolute(score), _relative(score.metrics), _quality(score)
 
 

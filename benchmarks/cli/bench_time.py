@@ -21,9 +21,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Measure, keep beside the store, print. Exit code 1 when no estimator has a time."""
     suite, store = opened(arguments)
-    found = list(measure(suite, arguments.repeats))
-    timings = sorted((one for one in found if isinstance(one, Timing)), key=lambda timing: timing.least_us)
-    untimed = [one for one in found if isinstance(one, Untimed)]
+    measured = list(measure(suite, arguments.repeats))
+    timings = sorted((one for one in measured if isinstance(one, Timing)), key=lambda timing: timing.least_us)
+    untimed = [one for one in measured if isinstance(one, Untimed)]
     rows = {"timings": [one._asdict() for one in timings], "untimed": [one._asdict() for one in untimed]}
     write_json(store.folder / TIMING_FILE, {"machine": machine(), **rows})
     for one in untimed:

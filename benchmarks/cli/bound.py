@@ -26,7 +26,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--scans", type=at_least_one, default=1, metavar="N", help="readings of each anchor in one fix")
     parser.add_argument("--step", type=float, metavar="M", help="size of the floor's cells; by default some thousands")
-    parser.add_argument("--limit", type=float, default=LIMIT_M, metavar="M", help="tell the share of floor below it")
+    parser.add_argument("--limit", type=float, default=LIMIT_M, metavar="M", help="report the share of floor below it")
     parser.add_argument(
         "--offset-std",
         type=float,

@@ -15,7 +15,7 @@ from benchmarks.runner.suite_file import load_suite
 
 
 def suite_options(parser: argparse.ArgumentParser) -> None:
-    """What every verb of a suite takes."""
+    """The arguments of every verb of a suite."""
     parser.add_argument(
         "suite",
         type=Path,

@@ -55,7 +55,7 @@ class Fault(ABC):
 
     @property
     def lasts(self) -> Windows:
-        """When it acts; empty for one that lasts the whole run, or never acts."""
+        """Windows in which it acts; empty for one that lasts the whole run, or never acts."""
         windows: Windows | None = getattr(self, "windows", None)
         return windows or ()
 

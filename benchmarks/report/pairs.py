@@ -1,4 +1,4 @@
-"""Who beats whom, and in which run: each number leads to the cell it comes from."""
+"""Verdicts on pairs, and scores run by run: each number leads to the cell it comes from."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from fusion.output.tables import Table
 
 
 def run_by_run(data: ReportData) -> Table:
-    """What every estimator scored in every run: what the verdicts are made of."""
+    """Scores of every estimator in every run, which the verdicts rest on."""
     grouped = by_estimator(data.results)
     rows = []
     for run_id in by_run(grouped[data.estimators[0]]):
         cells = [by_run(grouped[name])[run_id] for name in data.estimators]
         scores = [float(np.median(score_matrix(own, data.metric))) for own in cells]
-        told = [
+        linked = [
             link(data, data.unit.number(score), nearest(own, data.metric, score))
             for own, score in zip(cells, scores, strict=True)
         ]
-        rows.append((run_id, *told))
+        rows.append((run_id, *linked))
     over = ", median over seeds" if data.suite.seeds > 1 else ""
     unit = f" [{data.unit.name}]" if data.unit.name else ""
     title = f"Run by run: {data.metric}{unit} without faults{over}"

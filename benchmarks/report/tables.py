@@ -32,7 +32,7 @@ OUTAGE_COLUMNS = (
 
 
 def leaderboard(data: ReportData) -> Table:
-    """The best first, with the letters that say who cannot be told apart, and the worst run beside the median."""
+    """The best first, with a letter for those that cannot be distinguished, and the worst run beside the median."""
     grouped, unit = by_estimator(data.results), data.unit
     letters = data.comparison.letters if data.comparison else {}
     rows = []
@@ -59,16 +59,16 @@ def _interval(scores: Floats, unit: Unit) -> str:
     alive = scores[np.isfinite(scores) & (scores > 0.0)]
     if len(alive) < 2:
         return "–"
-    found = mean_interval(np.log(alive))
-    mean, low, high = (unit.number(math.exp(min(float(value), 50.0))) for value in found[:3])
+    interval = mean_interval(np.log(alive))
+    mean, low, high = (unit.number(math.exp(min(float(value), 50.0))) for value in interval[:3])
     gone = f" ({len(scores) - len(alive)} lost)" if len(alive) < len(scores) else ""
     return f"{mean} [{low}, {high}]{gone}"
 
 
 def faults(data: ReportData) -> Table:
-    """How much worse each fault makes each estimator: the median over runs of faulty over clean."""
-    clean, struck = by_estimator(data.results), data.suite.faults[1:]
-    rows = [(name, *(_under(data, name, clean[name], fault.id) for fault in struck)) for name in data.estimators]
+    """Effect of each fault on each estimator: the median over runs of faulty over clean."""
+    clean, applied = by_estimator(data.results), data.suite.faults[1:]
+    rows = [(name, *(_under(data, name, clean[name], fault.id) for fault in applied)) for name in data.estimators]
     head = ("estimator", *(fault.id for fault in data.suite.faults if fault.id != CLEAN))
     return Table(f"Faults: {data.metric} as a multiple of the clean run's, median over runs", head, tuple(rows))
 
@@ -86,7 +86,7 @@ def _under(data: ReportData, name: str, clean: Sequence[Result], fault: str) -> 
 
 
 def outages(data: ReportData) -> Table:
-    """What each fault with windows did while it lasted, and how soon after that was over; no rows without such."""
+    """Errors while each fault with windows lasted, and the recovery after it; no rows without such."""
     rows, clean = [], by_estimator(data.results)
     for fault in data.suite.faults[1:]:
         grouped = by_estimator(data.results, fault.id)
@@ -104,7 +104,7 @@ def _times(ratio: float) -> str:
 
 
 def limits(data: ReportData) -> Table:
-    """How many times the posterior Cramér-Rao bound of the run each estimator errs, over the shown runs."""
+    """Ratio of each estimator's error to the posterior Cramér-Rao bound of the run, over the shown runs."""
     bounds = {run_id: posterior_bound(data.run(run_id)) for run_id in data.scored_runs}
     rows = []
     for name in data.estimators:
@@ -122,15 +122,15 @@ def limits(data: ReportData) -> Table:
 
 
 def fixes(data: ReportData) -> Table:
-    """What one perfect fix from a reading of every anchor would err, over what each estimator errs (`eff_crlb`)."""
+    """Error of one perfect fix from a reading of every anchor over that of each estimator (`eff_crlb`)."""
     rows = []
     for name in data.estimators:
         series = [data.series.get((run_id, name)) for run_id in data.scored_runs]
-        found = [
+        ratios = [
             math.nan if one is None or not one.is_scored else eff_crlb(one.error_m, data.fix_bound_m(one))
             for one in series
         ]
-        rows.append((name, *("–" if math.isnan(ratio) else f"{100.0 * ratio:.0f} %" for ratio in found)))
+        rows.append((name, *("–" if math.isnan(ratio) else f"{100.0 * ratio:.0f} %" for ratio in ratios)))
     title = "One perfect fix: its Cramér-Rao bound over the RMSE (only motion or a prior brings more than 100 %)"
     return Table(title, ("estimator", *data.scored_runs), tuple(rows))
 
@@ -143,8 +143,8 @@ def credibility(data: ReportData) -> Table:
     faults = [fault.id for fault in data.suite.faults if fault.id != CLEAN]
     rows = []
     for name in data.estimators:
-        found = [credibility_metrics(data.seeds(name, fault)) for fault in faults]
-        rows.append((name, *(_decibels(scores) for scores in found)))
+        by_fault = [credibility_metrics(data.seeds(name, fault)) for fault in faults]
+        rows.append((name, *(_decibels(scores) for scores in by_fault)))
     title = "Credibility over the seeds: nci, and incl in brackets, dB (0 is credible, incl above 0 too certain)"
     return Table(title, ("estimator", *faults), tuple(rows))
 
@@ -154,7 +154,7 @@ def _decibels(scores: dict[str, float]) -> str:
 
 
 def moments(data: ReportData) -> Table:
-    """Where to look first."""
+    """The worst moments, each with its command."""
     rows = tuple(
         (
             one.cell.run.id,
@@ -179,7 +179,7 @@ def lost(data: ReportData) -> Table:
 
 
 def provenance(data: ReportData) -> Table:
-    """What every run and estimator of the suite is, down to the hash."""
+    """Source and content hash of every run of the suite."""
     runs = [
         (run.id, run.mcap or f"{run.scenario}, seed {run.seed}", run.split, _content(data, run.id))
         for run in data.suite.runs
@@ -192,7 +192,7 @@ def _content(data: ReportData, run_id: str) -> str:
 
 
 def estimators(data: ReportData) -> Table:
-    """What was run under each name, and on which runs its parameters were chosen."""
+    """Estimator and parameters of each name, and the runs on which they were chosen."""
     rows = tuple(
         (
             one.id,
@@ -206,7 +206,7 @@ def estimators(data: ReportData) -> Table:
 
 
 def damage(data: ReportData) -> Table:
-    """What each fault does, as the suite has it; no rows without any."""
+    """Definition of each fault, as the suite has it; no rows without any."""
     rows = tuple(
         (fault.id, "; ".join(", ".join(f"{key} = {value}" for key, value in one.items()) for one in fault.apply))
         for fault in data.suite.faults

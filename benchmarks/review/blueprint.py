@@ -91,8 +91,8 @@ def _details(drawn: Sequence[Drawing]) -> list[Any]:
     details = []
     for drawing in (drawing for drawing in drawn if not drawing.is_counterfactual):
         name, views = drawing.name, []
-        if any(drawing.claims):
-            views.append(tabs(_claims(drawing)))
+        if drawing.has_variance:
+            views.append(tabs(_component_errors(drawing)))
         # Behind each other, for four plots in a column are too low for the numbers on their axes.
         honesty = _honesty(drawing)
         views += [tabs(honesty)] if honesty else []
@@ -102,7 +102,7 @@ def _details(drawn: Sequence[Drawing]) -> list[Any]:
     return details
 
 
-def _claims(drawing: Drawing) -> list[Any]:
+def _component_errors(drawing: Drawing) -> list[Any]:
     """Each component of the error on what is claimed of it, all of either inside the plot."""
     import rerun as rr
 
@@ -133,7 +133,7 @@ def _honesty(drawing: Drawing) -> list[Any]:
     import rerun as rr
 
     name, views = drawing.name, []
-    if any(drawing.claims):
+    if drawing.has_variance:
         title = f"{name}: NEES; 95 % should lie between the lines"
         views.append(plot(title, rr.new_entity_path(["nees", name]), span=upward(_nees_top(drawing)), legend=False))
     if drawing.reviewed.clouds is not None:

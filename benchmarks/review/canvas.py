@@ -119,6 +119,6 @@ def draw_path(
 
 
 def mostly_jumps(time_ns: Stamps, xy: Floats) -> bool:
-    """Whether most of a path's length is jumps, as of a method without memory: lines there would hide the map."""
+    """True where most of a path's length is jumps, as of a method without memory: lines there would hide the map."""
     steps_m, steps_s = np.hypot(*np.diff(xy, axis=0).T), np.diff(time_ns) / NANOSECONDS
     return bool(steps_m[steps_m > JUMP_M_S * steps_s].sum() > 0.5 * steps_m.sum())

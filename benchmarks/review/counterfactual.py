@@ -22,8 +22,8 @@ class Counterfactual(NamedTuple):
 
 def counterfactuals(run: Run, without: Sequence[str], reject_s: Sequence[float]) -> list[Counterfactual]:
     """One for each anchor of ``without`` and each time of ``reject_s``, each of them once; raises `ParameterError`."""
-    found = [without_anchor(run, anchor) for anchor in without] + [without_radio_at(run, at_s) for at_s in reject_s]
-    return list({counterfactual.suffix: counterfactual for counterfactual in found}.values())
+    chosen = [without_anchor(run, anchor) for anchor in without] + [without_radio_at(run, at_s) for at_s in reject_s]
+    return list({counterfactual.suffix: counterfactual for counterfactual in chosen}.values())
 
 
 def without_anchor(run: Run, anchor: str) -> Counterfactual:

@@ -74,7 +74,7 @@ class Drawing:
 
     @property
     def is_counterfactual(self) -> bool:
-        """Whether it is of a run that did not happen, and is drawn thin."""
+        """True where it is of a run that did not happen, and is drawn thin."""
         return self.reviewed.counterfactual_of is not None
 
     @property
@@ -114,13 +114,13 @@ class Drawing:
 
     @cached_property
     def gates(self) -> bool:
-        """Whether it uses radio at all, so that there is a weight to show; of a counterfactual none is shown."""
+        """True where it uses radio at all, so that there is a weight to show; of a counterfactual none is shown."""
         unused = self.fates.met(Reason.KIND_NOT_CONSUMED) | self.fates.met(Decision.LATE)  # which may be of anything
         return not self.is_counterfactual and not bool(unused.all())
 
     @cached_property
     def has_nis(self) -> bool:
-        """Whether any reading has an NIS."""
+        """True where any reading has an NIS."""
         return bool(np.isfinite(self.fates.nis).any())
 
     @cached_property
@@ -129,9 +129,9 @@ class Drawing:
         return None if self.instants is None or self.answers is None else signed_errors(self.instants, self.answers)
 
     @cached_property
-    def claims(self) -> list[bool]:
-        """Whether it ever claims a variance of x, y and heading."""
-        return [False] * 3 if self.errors is None else [bool(np.isfinite(v).any()) for v in self.errors.variance.T]
+    def has_variance(self) -> bool:
+        """True where it ever claims a variance of x, y or heading."""
+        return self.errors is not None and bool(np.isfinite(self.errors.variance).any())
 
 
 def drawings(run: Run, reviewed: Sequence[Reviewed]) -> list[Drawing]:

@@ -84,7 +84,7 @@ def _readings_off(
     # A heading that is not known misplaces an antenna by its distance from the robot's middle at most.
     places = Places.of_poses(world, x, y, np.nan_to_num(heading))
     anchors = {anchor.id: anchor for anchor in world.anchors}
-    found: dict[tuple[str, bool], list[tuple[float, float]]] = {}
+    residuals: dict[tuple[str, bool], list[tuple[float, float]]] = {}
     for i, (scan, fates) in enumerate(scans):
         readings = {reading.anchor: reading for reading in scan.readings}
         judged = [fate for fate in fates if fate.reason is not Reason.KIND_NOT_CONSUMED]
@@ -92,8 +92,8 @@ def _readings_off(
             off = _off(anchors[fate.anchor], readings[fate.anchor], places, i)
             if math.isfinite(off[1]):
                 taken = fate.decision in (Decision.USED, Decision.DOWNWEIGHTED)
-                found.setdefault((fate.anchor, taken), []).append(off)
-    return found
+                residuals.setdefault((fate.anchor, taken), []).append(off)
+    return residuals
 
 
 def _off(anchor: Anchor, reading: RssiReading | RangeReading, places: Places, i: int) -> tuple[float, float]:
@@ -109,9 +109,9 @@ def _off(anchor: Anchor, reading: RssiReading | RangeReading, places: Places, i:
 
 def _truth_at(truth: Instants, time_ns: Sequence[int]) -> Floats:
     """True x, y [m] and heading [rad] (n, 3); NaN before, after, and in gaps of the truth."""
-    stamps, found = np.array(time_ns, dtype=np.int64), np.full((len(time_ns), 3), np.nan)
+    stamps, poses = np.array(time_ns, dtype=np.int64), np.full((len(time_ns), 3), np.nan)
     if len(truth) >= 2:
         inside = np.flatnonzero((stamps >= truth.time_ns[0]) & (stamps <= truth.time_ns[-1]))
         at, kept = interpolate_truth(truth, stamps[inside], gap_s=MAX_AGE_S)
-        found[inside[kept]] = np.column_stack([at.x, at.y, at.heading])[kept]
-    return found
+        poses[inside[kept]] = np.column_stack([at.x, at.y, at.heading])[kept]
+    return poses

@@ -74,7 +74,7 @@ def _draw_consistency(canvas: Canvas, drawing: Drawing) -> None:
 def _draw_nees(canvas: Canvas, drawing: Drawing) -> None:
     """NEES between its bounds, which depend on whether a heading is judged."""
     errors = drawing.score.errors
-    if drawing.instants is None or errors is None or not any(drawing.claims):
+    if drawing.instants is None or errors is None or not drawing.has_variance:
         return
     time_ns, place = drawing.instants.time_ns, ["nees", drawing.name]
     canvas.line([*place, "NEES"], "NEES", drawing.colour, time_ns, errors.nees, merge="Max")

@@ -50,11 +50,11 @@ def raw_series(world: World, measurements: Sequence[Measurement]) -> Series:
 
 def _by_sensor(measurements: Sequence[Measurement], kind: type[Kind]) -> dict[str, list[Kind]]:
     """Those of one kind by sensor, in time order, each stamp once."""
-    found: dict[str, dict[int, Kind]] = defaultdict(dict)
+    by_sensor: dict[str, dict[int, Kind]] = defaultdict(dict)
     for measurement in measurements:
         if isinstance(measurement, kind):
-            found[measurement.sensor][measurement.time_ns] = measurement
-    return {sensor: [own[time_ns] for time_ns in sorted(own)] for sensor, own in sorted(found.items())}
+            by_sensor[measurement.sensor][measurement.time_ns] = measurement
+    return {sensor: [own[time_ns] for time_ns in sorted(own)] for sensor, own in sorted(by_sensor.items())}
 
 
 def _stamps(measurements: Sequence[Measurement]) -> Stamps:

@@ -96,9 +96,9 @@ def review(
 
 def _worst(run: Run, reviewed: Sequence[Reviewed], count: int) -> list[Moment]:
     """Of every estimator, the best first; counterfactuals are compared, not searched."""
-    start_ns, drawn, found = Frame.around(run).start_ns, drawings(run, reviewed), []
+    start_ns, drawn, moments = Frame.around(run).start_ns, drawings(run, reviewed), []
     for drawing in drawn:
         if not drawing.is_counterfactual:
             others = [other for other in drawn if other.reviewed.counterfactual_of == drawing.name]
-            found += worst_moments(run, drawing, start_ns, count, others)
-    return found
+            moments += worst_moments(run, drawing, start_ns, count, others)
+    return moments

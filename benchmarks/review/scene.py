@@ -101,8 +101,8 @@ def _axes(drawn: Sequence[Drawing]) -> CdfAxes | None:
 def _worst(run: Run, drawn: Sequence[Drawing], start_ns: int) -> str:
     """The worst moment of each estimator that is shown, as a list; empty where nothing is judged."""
     shown = [drawing for drawing in drawn if drawing.shown and not drawing.is_counterfactual]
-    found = [moment for drawing in shown for moment in worst_moments(run, drawing, start_ns, 1)]
-    return "".join(["\nWorst moments\n\n", *(f"- {line(moment)}\n" for moment in found)]) if found else ""
+    moments = [moment for drawing in shown for moment in worst_moments(run, drawing, start_ns, 1)]
+    return "".join(["\nWorst moments\n\n", *(f"- {line(moment)}\n" for moment in moments)]) if moments else ""
 
 
 def markdown(drawn: Sequence[Drawing]) -> str:

@@ -66,7 +66,7 @@ def as_junit(suite: Suite, results: Sequence[Result]) -> bytes:
 
 
 def _printable(text: str) -> str:
-    """XML has no control characters, and an estimator may say anything."""
+    """XML has no control characters, and the error of an estimator may hold any."""
     return "".join(letter if letter.isprintable() or letter == "\n" else "?" for letter in text)
 
 

@@ -41,11 +41,11 @@ def fingerprint(module: str) -> str:
 
 def _sources(name: str) -> list[tuple[str, Path]]:
     """The files of a package or module, each with its place in it; those of `DECIDES_NOTHING` are left out."""
-    found = import_module(name)
-    if not hasattr(found, "__path__"):
-        return [(name, Path(str(found.__file__)))]
+    loaded = import_module(name)
+    if not hasattr(loaded, "__path__"):
+        return [(name, Path(str(loaded.__file__)))]
     left_out = tuple(f"{one.replace('.', '/')}/" for one in DECIDES_NOTHING)
     # A package without __init__.py has no file of its own, and may have several folders.
-    files = [(folder, path) for folder in found.__path__ for path in Path(folder).rglob("*")]
+    files = [(folder, path) for folder in loaded.__path__ for path in Path(folder).rglob("*")]
     places = [(f"{name.replace('.', '/')}/{path.relative_to(folder).as_posix()}", path) for folder, path in files]
     return sorted(one for one in places if one[0].endswith(SUFFIXES) and not one[0].startswith(left_out))

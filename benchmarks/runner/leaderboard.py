@@ -110,7 +110,7 @@ def pair_table(judged: Comparison) -> Table:
             f"{verdict.holm_p:.2g}",
             f"{verdict.signed_rank.p:.2g}",
         )
-        rows.append((f"{verdict.first} / {verdict.second}", *numbers, verdict.winner or "cannot tell"))
+        rows.append((f"{verdict.first} / {verdict.second}", *numbers, verdict.winner or "inconclusive"))
     head = ("pair", "ratio [95 %]", "runs compared", "p, Holm", "p, signed ranks", "better")
     return Table(f"Pairs on {judged.metric}", head, tuple(rows))
 

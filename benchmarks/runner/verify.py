@@ -30,7 +30,7 @@ def differing(cells: Sequence[Cell], store: Store, count: int, limits: Limits) -
 
 
 def _is_pure(cell: Cell, store: Store) -> bool:
-    """Whether the cell is there, and ended by itself."""
+    """True where the cell is there, and ended by itself."""
     if not store.has("scores", cell.score_key):
         return False
     made = store.read_json("estimates", cell.estimate_key, "result.json")
