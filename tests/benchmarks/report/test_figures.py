@@ -20,10 +20,10 @@ from benchmarks.report.report_data import ReportData
 from benchmarks.report.sensitivity import curves, sweeps
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite_file import load_suite
 from fusion.cli.main import main
 from fusion.output.figures import as_png, plain_colour
-from tests.benchmarks.browser import CHROMIUM, chromium
+from tests.benchmarks.report.browser import CHROMIUM, chromium
+from tests.benchmarks.suite_files import write_suite
 
 SUITE = """
 [suite]
@@ -57,8 +57,7 @@ grid = { window_s = [1.0, 2.5] }
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp("figures")
-    (folder / "suite.toml").write_text(SUITE, encoding="utf-8")
-    suite, store = load_suite(folder / "suite.toml"), Store(folder / "store")
+    suite, store = write_suite(folder, SUITE), Store(folder / "store")
     results = run_suite(suite, store, workers=1)
     assert main(["bench", "time", str(folder / "suite.toml"), "--store", str(folder / "store"), "--repeats", "1"]) == 0
     return ReportData(suite, results, store)

@@ -13,10 +13,10 @@ from benchmarks.runner.execute import carry_out
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite_file import load_suite
 from estimators.dead_reckoning import DeadReckoning
 from fusion import Pose
 from fusion.values import nanoseconds
+from tests.benchmarks.suite_files import write_suite
 
 SUITE = """
 [suite]
@@ -56,8 +56,7 @@ class Poisoned(DeadReckoning):
 @pytest.fixture(scope="module", params=["causal", "interp"])
 def data(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp(request.param)
-    (folder / "suite.toml").write_text(SUITE.format(reading=request.param), encoding="utf-8")
-    suite, store = load_suite(folder / "suite.toml"), Store(folder / "store")
+    suite, store = write_suite(folder, SUITE.format(reading=request.param)), Store(folder / "store")
     with fusion.registered("toy_poisoned", Poisoned):
         cells = cells_of(suite, store)
         for cell in cells:

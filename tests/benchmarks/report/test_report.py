@@ -28,7 +28,8 @@ from fusion.output.html import as_html
 from logs.reader import read_run
 from logs.writer import RunWriter
 from sensors.simulation.simulate import simulate
-from tests.benchmarks.browser import CHROMIUM, chromium
+from tests.benchmarks.report.browser import CHROMIUM, chromium
+from tests.benchmarks.suite_files import write_suite
 
 SUITE = """
 [suite]
@@ -56,8 +57,7 @@ apply = [{ kind = "drop", topic = "wifi" }]
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
-    (folder / "suite.toml").write_text(SUITE, encoding="utf-8")
-    run_suite(load_suite(folder / "suite.toml"), Store(folder / "store"), workers=1)
+    run_suite(write_suite(folder, SUITE), Store(folder / "store"), workers=1)
     return folder
 
 
@@ -120,8 +120,7 @@ def test_credibility_is_shown_where_there_are_enough_seeds(data, plain, tmp_path
     assert credibility(data).rows == (("wheels", "–"), ("radio", "–"))
     text = SUITE.replace('name = "page"', 'name = "page"\nseeds = 5').replace('"wifi" }', '"wifi", p = 0.5 }')
     text = text.replace("duration_s = 20.0", "duration_s = 10.0")
-    (tmp_path / "seeds.toml").write_text(text.replace('use = "radio_only"', 'use = "ekf"'), encoding="utf-8")
-    suite, store = load_suite(tmp_path / "seeds.toml"), Store(tmp_path / "store")
+    suite, store = write_suite(tmp_path, text.replace('use = "radio_only"', 'use = "ekf"')), Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
     seeded = ReportData(suite, read_results(cells_of(suite, store), store), store)
     assert "Credibility" in report(seeded)
@@ -134,8 +133,7 @@ def test_credibility_is_shown_where_there_are_enough_seeds(data, plain, tmp_path
 def test_fault_with_windows_is_shown_by_the_errors_inside(plain, tmp_path):
     assert "While a fault lasts" not in plain
     text = SUITE.replace('topic = "wifi" }', 'topic = "wifi", windows = [[5.0, 12.0]] }')
-    (tmp_path / "windows.toml").write_text(text, encoding="utf-8")
-    suite, store = load_suite(tmp_path / "windows.toml"), Store(tmp_path / "store")
+    suite, store = write_suite(tmp_path, text), Store(tmp_path / "store")
     results = run_suite(suite, store, workers=1)
     struck = ReportData(suite, results, store)
     assert "While a fault lasts" in report(struck)
@@ -150,8 +148,7 @@ def test_fault_with_windows_is_shown_by_the_errors_inside(plain, tmp_path):
 def test_comparison_within_a_run_is_shown_only_where_it_is_the_only_one(plain, tmp_path):
     assert "within this run" not in plain
     office, _, rest = SUITE.partition('[[runs]]\nid = "mec"')
-    (tmp_path / "one.toml").write_text(office + rest[rest.index("[[estimators]]") :], encoding="utf-8")
-    suite, store = load_suite(tmp_path / "one.toml"), Store(tmp_path / "store")
+    suite, store = write_suite(tmp_path, office + rest[rest.index("[[estimators]]") :]), Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
     page = report(ReportData(suite, read_results(cells_of(suite, store), store), store))
     assert len(re.findall(r"- within this run, wheels beats radio by .*; other runs may differ", page)) == 1
@@ -326,8 +323,7 @@ def grids(tmp_path_factory):
 
 
 def grid_of(folder, text):
-    (folder / "grid.toml").write_text(text, encoding="utf-8")
-    suite, store = load_suite(folder / "grid.toml"), Store(folder / "store")
+    suite, store = write_suite(folder, text), Store(folder / "store")
     run_suite(suite, store, workers=1)
     return ReportData(suite, read_results(cells_of(suite, store), store), store)
 

@@ -25,6 +25,7 @@ from benchmarks.runner.verify import differing
 from benchmarks.runner.workers import Limits
 from fusion.cli.main import main
 from fusion.output.tables import Table
+from tests.benchmarks.suite_files import write_suite
 
 HEAD = '[suite]\nname = "verbs"\n'
 RUNS = "".join(
@@ -46,8 +47,7 @@ floor = { availability = 0.99 }
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("verbs")
-    (folder / "suite.toml").write_text(HEAD + RUNS + TAIL, encoding="utf-8")
-    suite = load_suite(folder / "suite.toml")
+    suite = write_suite(folder, HEAD + RUNS + TAIL)
     run_suite(suite, Store(folder / "store"), workers=1)
     return folder
 
