@@ -39,10 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _require(arguments: argparse.Namespace, results: Sequence[Result]) -> None:
     ids = {result.cell.estimator.id for result in results}
     faults = {result.cell.fault.id for result in results}
-    for what, asked, known in (
-        ("estimator", arguments.estimators, ids),
-        ("fault", [arguments.fault], faults),
-    ):
+    for what, asked, known in (("estimator", arguments.estimators, ids), ("fault", [arguments.fault], faults)):
         for one in asked:
             if one not in known:
                 raise ParameterError(f"the suite has no {what} {one!r}; {did_you_mean(one, sorted(known))}")

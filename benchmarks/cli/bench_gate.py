@@ -10,13 +10,7 @@ from pathlib import Path
 
 from benchmarks.cli.suite_arguments import opened, suite_options
 from benchmarks.metrics.catalogue import more_is_better
-from benchmarks.runner.gate import (
-    GRAVEST_FIRST,
-    Finding,
-    Outcome,
-    judge,
-    read_baseline,
-)
+from benchmarks.runner.gate import GRAVEST_FIRST, Finding, Outcome, judge, read_baseline
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results, require_metric
 from benchmarks.runner.verify import differing
@@ -29,10 +23,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion bench gate``."""
     suite_options(parser)
     parser.add_argument(
-        "--baseline",
-        type=Path,
-        metavar="F",
-        help="in place of the suite's: JSON of export, or HTML of report",
+        "--baseline", type=Path, metavar="F", help="in place of the suite's: JSON of export, or HTML of report"
     )
     parser.add_argument("--verify", type=at_least_one, default=0, metavar="N", help="compute N cells again and compare")
 

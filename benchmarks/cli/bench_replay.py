@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 from benchmarks.cli.suite_arguments import opened, suite_options
+from benchmarks.runner.gate import Outcome
 from benchmarks.runner.replay_log import one_cell, replay_cell
 from benchmarks.runner.suite import CLEAN
-from benchmarks.runner.verify import NOT_DETERMINISTIC
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -36,4 +36,4 @@ def run(arguments: argparse.Namespace) -> int:
         sys.stderr.write(f"fusion bench replay: {lost if kept['error'] else 'the same to the bit as in the store'}\n")
         return 0
     sys.stderr.write(f"fusion bench replay: {cell} is not what it was: {digest} now, {kept['digest']} in the store\n")
-    return NOT_DETERMINISTIC
+    return Outcome.NOT_DETERMINISTIC

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from benchmarks.cli.suite_arguments import opened, suite_options
+from benchmarks.runner.gate import Outcome
 from benchmarks.runner.leaderboard import suite_leaderboard
 from benchmarks.runner.results import Result, partly_headed, warnings
 from benchmarks.runner.run_suite import run_suite
@@ -61,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
             suite, store, workers=arguments.workers, part=arguments.shard, dask=arguments.dask, progress=progress
         )
     if not results:
-        return 3
+        return Outcome.NOT_MEASURED
     counted = Counter(result.status for result in results)
     sys.stderr.write(
         f"fusion bench run: {', '.join(f'{count} {status}' for status, count in sorted(counted.items()))}\n"

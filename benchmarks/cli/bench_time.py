@@ -29,15 +29,8 @@ def run(arguments: argparse.Namespace) -> int:
     for one in untimed:
         sys.stderr.write(f"fusion bench time: {one.estimator} has no time: {one.why}\n")
     head = ("µs per measurement", "least", "q25", "q75", "p50", "p95", "p99", "max", "CPU s per log s", "peak MB")
-    print_tables(
-        [
-            Table(
-                "Alone on this machine: processor time, means over repeats and single measurements; memory",
-                head,
-                tuple(map(_row, timings)),
-            )
-        ]
-    )
+    title = "Alone on this machine: processor time, means over repeats and single measurements; memory"
+    print_tables([Table(title, head, tuple(map(_row, timings)))])
     return 0 if timings else 1
 
 

@@ -28,11 +28,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--step", type=float, metavar="M", help="size of the floor's cells; by default some thousands")
     parser.add_argument("--limit", type=float, default=LIMIT_M, metavar="M", help="report the share of floor below it")
     parser.add_argument(
-        "--offset-std",
-        type=float,
-        default=0.0,
-        metavar="S",
-        help="common offset, dB or m; inf: not known",
+        "--offset-std", type=float, default=0.0, metavar="S", help="common offset, dB or m; inf: not known"
     )
     parser.add_argument("--add", action="store_true", help="find the best place for one more anchor")
     parser.add_argument("--move", action="store_true", help="find the best move of one anchor")

@@ -25,8 +25,8 @@ from fusion.radio import RadioKind
 
 Floats = NDArray[np.float64]
 
-POSITION, OFFSET, GAIN = slice(0, 2), 2, 3
-"""Rows and columns of an information matrix."""
+POSITION, OFFSET = slice(0, 2), 2
+"""Rows and columns of an information matrix; the gain follows the offset."""
 SINGULAR = 1e-12
 """A determinant below this share of what it would be with all directions alike is rounding: nothing is known."""
 

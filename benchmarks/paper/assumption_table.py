@@ -45,11 +45,7 @@ ROWS: tuple[Row, ...] = (
     ("floor, m", CHOSEN, _floor),
     ("access points, m from the floor's corner, the origin", CHOSEN, _anchors),
     ("length of the path, m", CHOSEN, _path),
-    (
-        "speed, m/s, and turn on the spot, rad/s",
-        CHOSEN,
-        _speeds,
-    ),
+    ("speed, m/s, and turn on the spot, rad/s", CHOSEN, _speeds),
     ("effective track, m", CHOSEN, lambda s: f"{s.world.robot.track_width_m:g}"),
     ("direction of the wheels is known", CHOSEN, lambda s: "yes" if s.world.robot.encoder == "quadrature" else "no"),
     ("start: place known to, cm, and heading to, rad", CHOSEN, _start),

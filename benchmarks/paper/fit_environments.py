@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.paper.assumptions import ALTERNATIVES, MAIN, Filling, Table, filled, short
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, WIFI, Environment
-from benchmarks.paper.trial import largest, track_errors
+from benchmarks.paper.trial import largest, point_errors
 from benchmarks.runner.estimator_run import run_estimator
 from benchmarks.runner.workers import TaskFailure, compute
 from fusion import FusionError
@@ -69,7 +69,7 @@ def largest_error(unknown: Unknown, table: Table, value: float, seed: int) -> fl
     quiet["reality"]["gyro_hz"] = 0.0
     quiet["reality"] |= {"ticks_hz": 0.0} if unknown.estimator == WIFI else {"scans_at_stop": 1}
     run = simulated_run(Scenario.from_table(unknown.environment.scenario, quiet), seed)
-    return largest(track_errors(run, run_estimator(run, unknown.estimator, seed=seed)))
+    return largest(point_errors(run, run_estimator(run, unknown.estimator, seed=seed).track))
 
 
 def solve(task: tuple[Unknown, Table, range]) -> Solved:

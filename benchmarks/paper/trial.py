@@ -66,11 +66,6 @@ def point_errors(run: Run, track: Track) -> Floats:
     return np.where(answers.valid[:, None], away, np.inf)
 
 
-def track_errors(run: Run, one: EstimatorRun) -> Floats:
-    """`point_errors` of an estimator; one that crashed gave no answer at all."""
-    return point_errors(run, one.track)
-
-
 @lru_cache(maxsize=8)
 def _scenario(place: str | Path) -> Scenario:
     return load_scenario(place)
@@ -92,7 +87,7 @@ def run_trial(task: tuple[str | Path, int], estimators: Sequence[str] | None = N
     made |= {name + GYRO: (aided, run_estimator(aided, name, seed=seed)) for name in GYRO_ESTIMATORS}
     brief = leg_by_leg(plain)
     return Trial(
-        {name: track_errors(*one) for name, one in made.items()},
+        {name: point_errors(run, one.track) for name, (run, one) in made.items()},
         _refused(made[PROPOSED][1]),
         np.array([proposed_largest(brief, each.options) for each in INTERPRETATIONS]),
         np.array([proposed_largest(missing_wifi(brief, seed), {MISSING_OPTION: value}) for value in MISSING_VALUES]),
@@ -107,7 +102,8 @@ def run_alternative(task: tuple[Scenario, int]) -> Mapping[str, float]:
     scenario, seed = task
     brief = leg_by_leg(without_gyro(simulated_run(scenario, seed)))
     alone = {
-        name: largest(track_errors(brief, run_estimator(brief, name, seed=seed))) for name in (ODOMETRY, WIFI, EKF)
+        name: largest(point_errors(brief, run_estimator(brief, name, seed=seed).track))
+        for name in (ODOMETRY, WIFI, EKF)
     }
     return alone | {scale: proposed_largest(brief, {SCALE_OPTION: scale}) for scale in SCALES}
 

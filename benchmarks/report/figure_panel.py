@@ -23,11 +23,7 @@ ROW_INCHES, LINE_INCHES = 0.45, 0.17
 LONG_NAME = 26
 """Letters of which two fit side by side into a legend no more."""
 
-DIGITS = (
-    (0.6, (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)),
-    (2.0, (1.0, 2.0, 5.0)),
-    (np.inf, (1.0,)),
-)
+DIGITS = ((0.6, (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)), (2.0, (1.0, 2.0, 5.0)), (np.inf, (1.0,)))
 """Digits of the ticks for so many decades along x: as many as have room side by side."""
 
 POINTING = """

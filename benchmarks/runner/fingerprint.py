@@ -14,13 +14,7 @@ from pathlib import Path
 
 HOST = ("fusion", "logs")
 """The rooms that every result rests on: the host of the estimators, and the reader of the runs with their prior."""
-DECIDES_NOTHING = (
-    "fusion.conformance",
-    "fusion.cli",
-    "fusion.output",
-    "logs.cli",
-    "sensors.cli",
-)
+DECIDES_NOTHING = ("fusion.conformance", "fusion.cli", "fusion.output", "logs.cli", "sensors.cli")
 """Packages of ours whose code decides no number."""
 ROOM_OF_FAULTS = "benchmarks.faults"
 """Of `benchmarks`, the one package that an estimate rests on."""

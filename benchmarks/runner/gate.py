@@ -23,7 +23,7 @@ from fusion.output.html import data_of
 
 @unique
 class Outcome(IntEnum):
-    """Outcome of a gate, as its exit code."""
+    """Outcome of a gate, of `bench verify` and of `bench replay`, as their exit code."""
 
     PASS = 0
     REGRESSION = 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import platform
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from benchmarks.runner.plan import Cell
 from benchmarks.runner.store import Store
 from benchmarks.runner.suite import CLEAN, TEST, Suite
 from benchmarks.statistics.verdict import Comparison, compare
-from fusion import ParameterError, SuiteError
+from fusion import ParameterError
 from fusion.arrays import Floats
 from fusion.errors import did_you_mean
 
@@ -171,12 +171,3 @@ def detailed(result: Result) -> dict[str, object]:
         "cpu_per_measurement_s": result.cost_s,
         "versions": {"fusion": fusion.__version__, "numpy": np.__version__, "python": platform.python_version()},
     }
-
-
-NOT_MEASURED = 3
-"""Exit code of a verb that found nothing to judge."""
-
-
-def refuse_incomplete(suite: Suite, there: int, wanted: int) -> NoReturn:
-    """A part of a suite is not its result."""
-    raise SuiteError(f"{suite.name}: {there} of {wanted} cells are there; run `fusion bench run` first")

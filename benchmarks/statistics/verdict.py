@@ -39,8 +39,8 @@ class Verdict:
 
     ``log_ratio``: of first over second, below 0 where the first is better, from the ``compared`` runs in which both
     scored. In the others at least one was lost: ``wins`` (only the second was), ``losses`` (only the first), ``ties``
-    (both were). ``signed_rank`` is of all runs. ``holm_p`` is the p that decides, ``signed_rank_holm_p`` that of the
-    signed ranks, both corrected over all pairs that were compared together.
+    (both were). ``signed_rank`` is of all runs. ``holm_p`` is the p that decides, corrected over all pairs
+    that were compared together.
     """
 
     first: str
@@ -54,7 +54,6 @@ class Verdict:
     log_ratio: MeanInterval[float]
     signed_rank: SignedRank
     holm_p: float
-    signed_rank_holm_p: float
 
     @property
     def runs(self) -> int:
@@ -207,14 +206,9 @@ def _judge(medians: Mapping[str, Floats], first: str, second: str, metric: str, 
         log_ratio=mean,
         signed_rank=ranks,
         holm_p=1.0,
-        signed_rank_holm_p=1.0,
     )
 
 
 def _correct(pairs: Sequence[Verdict]) -> tuple[Verdict, ...]:
-    deciding = holm(np.array([pair.p for pair in pairs]))
-    ranks = holm(np.array([pair.signed_rank.p for pair in pairs]))
-    return tuple(
-        replace(pair, holm_p=float(p), signed_rank_holm_p=float(rank_p))
-        for pair, p, rank_p in zip(pairs, deciding, ranks, strict=True)
-    )
+    corrected = holm(np.array([pair.p for pair in pairs])).tolist()
+    return tuple(replace(pair, holm_p=p) for pair, p in zip(pairs, corrected, strict=True))

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.paper.interpretation_study import literal_of_scale
 from benchmarks.paper.interpretations import INTERPRETATIONS, OPTIONS, SCALES, literal
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
-from benchmarks.paper.trial import track_errors
+from benchmarks.paper.trial import point_errors
 from benchmarks.paper.variants import MISSING_SHARE, leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
 from benchmarks.runner.estimator_run import run_estimator
 from fusion import Gyro, Odometry, WifiScan
@@ -24,7 +24,7 @@ def plain(scenario="paper_office", seed=3):
 
 
 def errors(run, estimator, **options):
-    return track_errors(run, run_estimator(run, estimator, options))
+    return point_errors(run, run_estimator(run, estimator, options).track)
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
