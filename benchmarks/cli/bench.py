@@ -11,7 +11,7 @@ from benchmarks.runner.adhoc_suite import bench, remarks, tables, write_records
 from fusion.cli.arguments import at_least_one, not_negative
 from fusion.cli.options import parse_settings
 from fusion.output.progress import progress_bar
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 from fusion.plugins import left_out
 
 
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     for remark in (*(left_out() if chosen is None else ()), *families().refused, *remarks(results)):
         sys.stderr.write(f"fusion bench: {remark}\n")
     if arguments.json != Path("-"):
-        print_sheets(tables(results))
+        print_tables(tables(results))
     if arguments.json is not None:
         write_records(results, arguments.json)
     return 1 if all(result.status == "crashed" for result in results) else 0

@@ -1,4 +1,4 @@
-"""``fusion bench compare``: which estimator is better on these runs, or that they cannot tell."""
+"""``fusion bench compare``: which estimator is better on these runs, or that they are inconclusive."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from benchmarks.runner.results import Result, comparison, require_metric
 from benchmarks.runner.suite import CLEAN
 from fusion import ParameterError
 from fusion.errors import did_you_mean
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -32,17 +32,14 @@ def run(arguments: argparse.Namespace) -> int:
     judged = comparison(chosen, arguments.metric, arguments.fault)
     for verdict in judged.verdicts:
         sys.stdout.write(f"{verdict.sentence}\n")
-    print_sheets([pair_table(judged)])
+    print_tables([pair_table(judged)])
     return 0
 
 
 def _require(arguments: argparse.Namespace, results: Sequence[Result]) -> None:
     ids = {result.cell.estimator.id for result in results}
     faults = {result.cell.fault.id for result in results}
-    for what, asked, known in (
-        ("estimator", arguments.estimators, ids),
-        ("fault", [arguments.fault], faults),
-    ):
+    for what, asked, known in (("estimator", arguments.estimators, ids), ("fault", [arguments.fault], faults)):
         for one in asked:
             if one not in known:
                 raise ParameterError(f"the suite has no {what} {one!r}; {did_you_mean(one, sorted(known))}")

@@ -1,5 +1,5 @@
-"""``fusion bench gate``: may this change land? Exit code 0 yes, 1 no, 2 wrong usage or suite, 3 not measured, 4 cannot
-tell, 5 not deterministic; of several the first of 2, 3, 5, 1, 4.
+"""``fusion bench gate``: may this change land? Exit code 0 yes, 1 no, 2 wrong usage or suite, 3 not measured, 4
+inconclusive, 5 not deterministic; of several the first of 2, 3, 5, 1, 4.
 """
 
 from __future__ import annotations
@@ -10,13 +10,7 @@ from pathlib import Path
 
 from benchmarks.cli.suite_arguments import opened, suite_options
 from benchmarks.metrics.catalogue import more_is_better
-from benchmarks.runner.gate import (
-    GRAVEST_FIRST,
-    Finding,
-    Outcome,
-    judge,
-    read_baseline,
-)
+from benchmarks.runner.gate import GRAVEST_FIRST, Finding, Outcome, judge, read_baseline
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results, require_metric
 from benchmarks.runner.verify import differing
@@ -29,16 +23,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion bench gate``."""
     suite_options(parser)
     parser.add_argument(
-        "--baseline",
-        type=Path,
-        metavar="F",
-        help="in place of the suite's: JSON of export, or HTML of report",
+        "--baseline", type=Path, metavar="F", help="in place of the suite's: JSON of export, or HTML of report"
     )
     parser.add_argument("--verify", type=at_least_one, default=0, metavar="N", help="compute N cells again and compare")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Judge, tell every finding, answer the gravest."""
+    """Judge, print every finding, answer the gravest."""
     try:
         findings = _findings(arguments)
     except FusionError as error:
@@ -59,15 +50,19 @@ def _findings(arguments: argparse.Namespace) -> list[Finding]:
         require_metric(metric, results)
     for metric in filter(more_is_better, suite.gate.ratio):
         raise SuiteError(f"gate.ratio.{metric}: more of it is better, so it may grow as it likes; give it a floor")
-    found = judge(results, suite.gate, read_baseline(named) if named else None)
+    findings = judge(results, suite.gate, read_baseline(named) if named else None)
     if suite.gate.ratio and named is None:
-        asked = ", ".join(suite.gate.ratio)
-        found.append(Finding(Outcome.NOT_MEASURED, f"gate.ratio ({asked}) compares with a baseline; give --baseline"))
-    found += [
+        why = f"gate.ratio ({', '.join(suite.gate.ratio)}) compares with a baseline; give --baseline"
+        findings.append(Finding(Outcome.NOT_MEASURED, why))
+    findings += [
         Finding(Outcome.NOT_DETERMINISTIC, f"{cell}: computed again, it differs")
         for cell in differing(cells, store, arguments.verify, Limits(suite.limits.wall_s, suite.limits.rss_mb))
     ]
-    found += [Finding(Outcome.CANNOT_TELL, sentence) for sentence in suite.left_out]
+    findings += [Finding(Outcome.INCONCLUSIVE, sentence) for sentence in suite.left_out]
     if suite.gate.inconclusive == "warn":
-        found = [one._replace(outcome=Outcome.PASS) if one.outcome is Outcome.CANNOT_TELL else one for one in found]
-    return found or [Finding(Outcome.NOT_MEASURED, "the suite's [gate] asks for nothing; give ratio or floor")]
+        findings = [_as_warning(finding) for finding in findings]
+    return findings or [Finding(Outcome.NOT_MEASURED, "the suite's [gate] asks for nothing; give ratio or floor")]
+
+
+def _as_warning(finding: Finding) -> Finding:
+    return finding._replace(outcome=Outcome.PASS) if finding.outcome is Outcome.INCONCLUSIVE else finding

@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 from benchmarks.cli.suite_arguments import opened, suite_options
+from benchmarks.runner.gate import Outcome
 from benchmarks.runner.replay_log import one_cell, replay_cell
 from benchmarks.runner.suite import CLEAN
-from benchmarks.runner.verify import NOT_DETERMINISTIC
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -32,8 +32,8 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     kept = store.read_json("estimates", cell.estimate_key, "result.json")
     if kept["error"] or kept["digest"] == digest:
-        told = f"in the store it was lost: {kept['error']}" if kept["error"] else "the same to the bit as in the store"
-        sys.stderr.write(f"fusion bench replay: {told}\n")
+        lost = f"in the store it was lost: {kept['error']}"
+        sys.stderr.write(f"fusion bench replay: {lost if kept['error'] else 'the same to the bit as in the store'}\n")
         return 0
     sys.stderr.write(f"fusion bench replay: {cell} is not what it was: {digest} now, {kept['digest']} in the store\n")
-    return NOT_DETERMINISTIC
+    return Outcome.NOT_DETERMINISTIC

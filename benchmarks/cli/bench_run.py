@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from benchmarks.cli.suite_arguments import opened, suite_options
+from benchmarks.runner.gate import Outcome
 from benchmarks.runner.leaderboard import suite_leaderboard
 from benchmarks.runner.results import Result, partly_headed, warnings
 from benchmarks.runner.run_suite import run_suite
@@ -15,11 +16,11 @@ from benchmarks.runner.scoring import ALIVE
 from benchmarks.runner.suite import CLEAN
 from fusion.cli.arguments import at_least_one
 from fusion.output.progress import progress_bar
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 
 
 def lost(results: Sequence[Result]) -> list[str]:
-    """Why estimators have no score in some cells: a sentence for each status they ended with, and its first reason."""
+    """A sentence for each status with which estimators ended that have no score in some cells, and its first reason."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for one in results:
         if one.status not in ALIVE:
@@ -33,7 +34,7 @@ def _first(reasons: Sequence[str]) -> str:
 
 
 def remarks(results: Sequence[Result]) -> list[str]:
-    """Where the truth of a run has a heading at some instants only, one sentence for each run."""
+    """One sentence for each run whose truth has a heading at some instants only."""
     sentences = {one.run: partly_headed(one) for one in results if one.cell.fault.id == CLEAN}
     return [f"{run}: {sentence}" for run, sentence in sentences.items() if sentence]
 
@@ -61,12 +62,12 @@ def run(arguments: argparse.Namespace) -> int:
             suite, store, workers=arguments.workers, part=arguments.shard, dask=arguments.dask, progress=progress
         )
     if not results:
-        return 3
+        return Outcome.NOT_MEASURED
     counted = Counter(result.status for result in results)
     sys.stderr.write(
         f"fusion bench run: {', '.join(f'{count} {status}' for status, count in sorted(counted.items()))}\n"
     )
     for reason in (*warnings(results), *lost(results), *remarks(results)):
         sys.stderr.write(f"fusion bench run: {reason}\n")
-    print_sheets([suite_leaderboard(results)])
+    print_tables([suite_leaderboard(results)])
     return 0 if any(result.status in ALIVE for result in results) else 1

@@ -14,12 +14,12 @@ from benchmarks.metrics.catalogue import Column, column
 from benchmarks.metrics.relative_pose import REACHES
 from benchmarks.metrics.track_pair import MODES, PairScore, score_pair
 from fusion.output.files import write_json
-from fusion.output.tables import Sheet, print_sheets
+from fusion.output.tables import Table, print_tables
 
 
 def print_score(score: PairScore, file: IO[str] | None = None) -> None:
     """As tables for people."""
-    print_sheets(sheets(score), file)
+    print_tables(tables(score), file)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -97,39 +97,39 @@ RELATIVE = (
 )
 
 
-def sheets(score: PairScore) -> Sequence[Sheet]:
-    """Position and heading, the relative pose errors, and what tells how far to trust them."""
+def tables(score: PairScore) -> Sequence[Table]:
+    """Position and heading, the relative pose errors, and the counts they rest on."""
     return _absolute(score), _relative(score.metrics), _quality(score)
 
 
-def _absolute(score: PairScore) -> Sheet:
+def _absolute(score: PairScore) -> Table:
     if score.aligned is None or score.map_from_estimate is None:
         note = "" if score.align == "none" else f", not alignable by {score.align}"
         rows = tuple((one.title, one.text(score.metrics)) for one in POSITION)
-        return Sheet(f"{_title(score)}, raw{note}", ("error", "raw"), rows)
+        return Table(f"{_title(score)}, raw{note}", ("error", "raw"), rows)
     x, y, yaw = score.map_from_estimate
     title = (
         f"{_title(score)}; {score.align} turns the estimate by {math.degrees(yaw):.4f}° "
         f"and moves it by ({x:.4f}, {y:.4f}) m: RMSE raw / aligned = {score.ratio:.2f}"
     )
     both = (score.metrics, score.aligned)
-    return Sheet(title, ("error", "raw", "aligned"), tuple((c.title, *(c.text(v) for v in both)) for c in POSITION))
+    return Table(title, ("error", "raw", "aligned"), tuple((c.title, *(c.text(v) for v in both)) for c in POSITION))
 
 
 def _title(score: PairScore) -> str:
     return f"{Path(score.estimate).name} against {Path(score.truth).name}, {score.mode}"
 
 
-def _relative(metrics: dict[str, float]) -> Sheet:
+def _relative(metrics: dict[str, float]) -> Table:
     rows = [_reach(reach) for reach in REACHES]
     texts = tuple((reach[2:], *(one.text(metrics) for one in row)) for reach, row in zip(REACHES, rows, strict=True))
-    return Sheet("relative pose error after", ("reach", *(one.title for one in rows[0])), texts)
+    return Table("relative pose error after", ("reach", *(one.title for one in rows[0])), texts)
 
 
 def _reach(reach: str) -> list[Column]:
     return [column(f"rpe_{reach}_{what}", title, decimals=n, separator=", ") for what, title, n in RELATIVE]
 
 
-def _quality(score: PairScore) -> Sheet:
+def _quality(score: PairScore) -> Table:
     rows = tuple((one.title, one.text(score.metrics)) for one in QUALITY)
-    return Sheet("how far to trust this", ("what", "value"), rows)
+    return Table("how far to trust this", ("what", "value"), rows)

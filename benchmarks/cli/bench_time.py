@@ -9,7 +9,7 @@ from benchmarks.cli.suite_arguments import opened, suite_options
 from benchmarks.runner.timing import REPEATS, TIMING_FILE, Timing, Untimed, machine, measure
 from fusion.cli.arguments import at_least_one
 from fusion.output.files import write_json
-from fusion.output.tables import Sheet, print_sheets
+from fusion.output.tables import Table, print_tables
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -21,23 +21,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Measure, keep beside the store, print. Exit code 1 when no estimator has a time."""
     suite, store = opened(arguments)
-    found = list(measure(suite, arguments.repeats))
-    timings = sorted((one for one in found if isinstance(one, Timing)), key=lambda timing: timing.least_us)
-    untimed = [one for one in found if isinstance(one, Untimed)]
+    measured = list(measure(suite, arguments.repeats))
+    timings = sorted((one for one in measured if isinstance(one, Timing)), key=lambda timing: timing.least_us)
+    untimed = [one for one in measured if isinstance(one, Untimed)]
     rows = {"timings": [one._asdict() for one in timings], "untimed": [one._asdict() for one in untimed]}
     write_json(store.folder / TIMING_FILE, {"machine": machine(), **rows})
     for one in untimed:
         sys.stderr.write(f"fusion bench time: {one.estimator} has no time: {one.why}\n")
     head = ("µs per measurement", "least", "q25", "q75", "p50", "p95", "p99", "max", "CPU s per log s", "peak MB")
-    print_sheets(
-        [
-            Sheet(
-                "Alone on this machine: processor time, means over repeats and single measurements; memory",
-                head,
-                tuple(map(_row, timings)),
-            )
-        ]
-    )
+    title = "Alone on this machine: processor time, means over repeats and single measurements; memory"
+    print_tables([Table(title, head, tuple(map(_row, timings)))])
     return 0 if timings else 1
 
 

@@ -6,8 +6,9 @@ import argparse
 import sys
 
 from benchmarks.cli.suite_arguments import opened, suite_options
+from benchmarks.runner.gate import Outcome
 from benchmarks.runner.plan import cells_of
-from benchmarks.runner.verify import NOT_DETERMINISTIC, NOT_MEASURED, _is_pure, differing
+from benchmarks.runner.verify import differing, is_pure
 from benchmarks.runner.workers import Limits
 from fusion.cli.arguments import at_least_one
 
@@ -22,12 +23,12 @@ def run(arguments: argparse.Namespace) -> int:
     """Name the cells that differ. Exit code 5 when some do, 3 when none is there to compare."""
     suite, store = opened(arguments)
     cells = cells_of(suite, store)
-    if not any(_is_pure(cell, store) for cell in cells):
+    if not any(is_pure(cell, store) for cell in cells):
         sys.stderr.write("fusion bench verify: no cell is there that ended by itself; run the suite first\n")
-        return NOT_MEASURED
+        return Outcome.NOT_MEASURED
     wrong = differing(cells, store, arguments.sample, Limits(suite.limits.wall_s, suite.limits.rss_mb))
     for cell in wrong:
         sys.stdout.write(f"{cell}: computed again, it differs\n")
     if not wrong:
         sys.stdout.write("computed again, every sampled cell is the same to the bit\n")
-    return NOT_DETERMINISTIC if wrong else 0
+    return Outcome.NOT_DETERMINISTIC if wrong else 0

@@ -10,11 +10,11 @@ from typing import get_args
 
 from benchmarks.limits.floor_picture import draw
 from benchmarks.limits.floor_plan import LIMIT_M, plan_site
-from benchmarks.limits.floor_tables import sheets, write_record
+from benchmarks.limits.floor_tables import tables, write_record
 from fusion.cli.arguments import at_least_one
 from fusion.output.figures import require_matplotlib
 from fusion.output.progress import progress_bar
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 from fusion.radio import RadioKind
 
 
@@ -26,13 +26,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--scans", type=at_least_one, default=1, metavar="N", help="readings of each anchor in one fix")
     parser.add_argument("--step", type=float, metavar="M", help="size of the floor's cells; by default some thousands")
-    parser.add_argument("--limit", type=float, default=LIMIT_M, metavar="M", help="tell the share of floor below it")
+    parser.add_argument("--limit", type=float, default=LIMIT_M, metavar="M", help="report the share of floor below it")
     parser.add_argument(
-        "--offset-std",
-        type=float,
-        default=0.0,
-        metavar="S",
-        help="common offset, dB or m; inf: not known",
+        "--offset-std", type=float, default=0.0, metavar="S", help="common offset, dB or m; inf: not known"
     )
     parser.add_argument("--add", action="store_true", help="find the best place for one more anchor")
     parser.add_argument("--move", action="store_true", help="find the best move of one anchor")
@@ -59,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     for remark in plan.remarks:
         sys.stderr.write(f"fusion bound: {remark}\n")
     if arguments.json != Path("-"):
-        print_sheets(sheets(plan))
+        print_tables(tables(plan))
     if arguments.json is not None:
         write_record(plan, arguments.json)
     if arguments.png is not None:

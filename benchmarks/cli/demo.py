@@ -28,7 +28,7 @@ from benchmarks.runner.suite_file import load_suite
 from fusion import FusionError, ViewerError
 from fusion.cli.arguments import not_negative
 from fusion.output.files import write
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 from fusion.plugins import left_out
 from logs.run import Run
 from sensors.simulation.simulate import simulate
@@ -48,7 +48,7 @@ class Drawn(NamedTuple):
 
 
 class Demo(NamedTuple):
-    """What a demo leaves behind. ``page`` is None where figures cannot be drawn."""
+    """Results of a demo. ``page`` is None where figures cannot be drawn."""
 
     log: Path
     records: Path
@@ -71,15 +71,15 @@ def demo(
     draw. ``duration_s`` cuts the run short. Then compare a few estimators over several runs: ``suite``, its results in
     ``bench``, as ``report.html``.
 
-    Progress and what could not be drawn are told on stderr.
+    Progress and whatever could not be drawn are reported on stderr.
     """
-    _tell(f"simulating a robot in the {SCENARIO}")
+    _print_progress(f"simulating a robot in the {SCENARIO}")
     folder.mkdir(parents=True, exist_ok=True)
     log = simulate(SCENARIO, folder / "run.mcap", seed=seed, duration_s=duration_s)
-    _tell("running every estimator on the same record")
+    _print_progress("running every estimator on the same record")
     results = bench([log], seed=seed, workers=workers)
     for remark in (*left_out(), *remarks(results)):
-        _tell(remark)
+        _print_progress(remark)
     records = folder / "scores.json"
     write_records(results, records)
     drawn = _draw(own_log(log), folder, seed)
@@ -88,7 +88,7 @@ def demo(
 
 def _draw(run: Run, folder: Path, seed: int) -> Drawn:
     """The review and its picture; the scores of the demo do not depend on them."""
-    _tell("drawing the review")
+    _print_progress("drawing the review")
     reviewed = fold(run, {name: {} for name in fusion.available()}, seed)
     scene, picture = None, folder / "review.png"
     try:
@@ -102,27 +102,27 @@ def _draw_instead(run: Run, reviewed: Sequence[Reviewed], picture: Path, why: Vi
     try:
         draw_plainly(run, reviewed, picture)
     except FusionError as error:
-        _tell(f"no picture: {why}; {error}")
+        _print_progress(f"no picture: {why}; {error}")
         return None
-    _tell(f"{picture} is by matplotlib, not by Rerun: {why}")
+    _print_progress(f"{picture} is by matplotlib, not by Rerun: {why}")
     return picture
 
 
 def _report(suite: Path, folder: Path, workers: int | None) -> Path | None:
     """The page of a suite, of which only what is missing is computed."""
     loaded, store, page = load_suite(suite), Store(folder / "bench"), folder / "report.html"
-    _tell(f"running the suite {loaded.name}: several runs, and a fault")
+    _print_progress(f"running the suite {loaded.name}: several runs, and a fault")
     data = ReportData(loaded, run_suite(loaded, store, workers=workers), store)
     try:
-        _tell("writing its report")
+        _print_progress("writing its report")
         write(page, as_page(data))
     except FusionError as error:
-        _tell(f"no report: {error}")
+        _print_progress(f"no report: {error}")
         return None
     return page
 
 
-def _tell(progress: str) -> None:
+def _print_progress(progress: str) -> None:
     sys.stderr.write(f"fusion demo: {progress}\n")
 
 
@@ -134,9 +134,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Make the demo, print its table, show it, and say what to try next. Exit code 1 when no estimator survived."""
+    """Make the demo, print its table and commands to try next, show it. Exit code 1 when no estimator survived."""
     made = demo(arguments.output, seed=arguments.seed)
-    print_sheets(tables(made.results))
+    print_tables(tables(made.results))
     for path in (made.log, made.records, made.drawn.scene, made.drawn.picture, made.page):
         if path is not None:
             sys.stdout.write(f"{path}\n")
@@ -147,19 +147,19 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _show(scene: Path | None) -> bool:
-    """Whether the viewer is open now."""
+    """Open the viewer; answers True where it is open now."""
     if scene is None:
         return False
     try:
         open_viewer([scene])
     except ViewerError as error:
-        _tell(f"no window: {error}")
+        _print_progress(f"no window: {error}")
         return False
     return True
 
 
 def next_commands(made: Demo, *, window: bool) -> list[str]:
-    """What to try next, for a shell in this folder; ``window``: whether a viewer can be opened."""
+    """Commands to try next, for a shell in this folder; ``window``: whether a viewer can be opened."""
     review, bench = ["review", str(made.log)], ["bench", str(made.log), "--estimators", "ekf"]
     if not window:
         picture = ["--estimators", "ekf,particle", "--png", str(made.log.with_name("two.png"))]
@@ -170,11 +170,11 @@ def next_commands(made: Demo, *, window: bool) -> list[str]:
 
 
 def program() -> str:
-    """What starts this program: ``fusion`` where a shell finds it by that name, else its path."""
+    """The word that starts this program: ``fusion`` where a shell finds it by that name, else its path."""
     running = Path(sys.argv[0])
     if running.stem != "fusion":
         running = Path(sys.executable).with_name("fusion")
-    found = shutil.which("fusion")
-    if not running.is_file() or (found is not None and os.path.samefile(found, running)):
+    installed = shutil.which("fusion")
+    if not running.is_file() or (installed is not None and os.path.samefile(installed, running)):
         return "fusion"
     return str(running)

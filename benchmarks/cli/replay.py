@@ -1,4 +1,4 @@
-"""``fusion replay``: run one estimator over a log again, and keep everything it said beside the measurements."""
+"""``fusion replay``: run one estimator over a log again, and keep all its updates beside the measurements."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def replay(
     seed: int = 0,
     verify: Path | None = None,
 ) -> str:
-    """Fold ``run`` through ``estimator`` and answer the digest of all it said.
+    """Fold ``run`` through ``estimator`` and answer the digest of its updates.
 
     ``output``: a new log with the measurements and truth of ``run`` and the estimates and Fates as channels; the same
     arguments give the same bytes. ``verify``: an earlier replay whose digest must be the same. Raises `LogError`,
@@ -43,9 +43,7 @@ def replay(
     if verify is not None:
         _verify(verify, made)
     if output is not None:
-        certificate = {"digest": made.digest, "estimator": estimator, "seed": str(seed)}
-        certificate["parameters"] = json.dumps(dict(options or {}), sort_keys=True)
-        write_replay(recorded, made, output, {**recorded.metadata, **certificate})
+        write_replay(recorded, made, output, options=options, seed=seed)
     return made.digest
 
 
@@ -71,13 +69,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="a parameter of the estimator; repeatable"
     )
-    parser.add_argument("--verify", type=Path, metavar="LOG", help="fail unless this earlier replay said the same")
+    parser.add_argument(
+        "--verify", type=Path, metavar="LOG", help="fail unless the digest of this earlier replay is the same"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Replay, and print the digest."""
     if arguments.output is None and arguments.verify is None:
-        raise ParameterError("nothing to do with what the estimator says; give -o OUT.mcap, --verify LOG or both")
+        raise ParameterError("nothing to do with the estimates; give -o OUT.mcap, --verify LOG or both")
     digest = replay(
         arguments.run,
         arguments.estimator,

@@ -17,7 +17,7 @@ from fusion.cli.arguments import at_least_one, not_negative
 from fusion.output.figures import require_matplotlib
 from fusion.output.files import require_place, write_json
 from fusion.output.progress import progress_bar
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 from fusion.plugins import left_out
 
 Writer = Callable[[Report, Path], object]
@@ -52,7 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Calibrate; or run, print, write."""
     if arguments.calibrate is not None:
         workers = arguments.workers or os.cpu_count() or 1
-        for path in write_calibrated(arguments.calibrate, scenarios=arguments.scenarios, workers=workers, told=_tell):
+        for path in write_calibrated(
+            arguments.calibrate, scenarios=arguments.scenarios, workers=workers, report=_report
+        ):
             sys.stdout.write(f"{path}\n")
         return 0
     writers = _writers(arguments)
@@ -66,8 +68,8 @@ def run(arguments: argparse.Namespace) -> int:
             progress=progress,
         )
     for remark in (*(left_out() if arguments.estimators is None else ()), *report.remarks):
-        _tell(remark)
-    print_sheets(list(report.sheets.values()))
+        _report(remark)
+    print_tables(list(report.tables.values()))
     sys.stdout.write(f"{in_words(report.judged)}\n")
     for path, writer in writers:
         writer(report, path)
@@ -76,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _writers(arguments: argparse.Namespace) -> list[tuple[Path, Writer]]:
-    """What is to be written where. What that needs is looked for before minutes are spent."""
+    """Places and writers of the results. Their needs are checked before minutes are spent."""
     drawn: list[tuple[Path | None, Writer]] = [
         (arguments.html, write_html),
         (arguments.png, write_png),
@@ -94,5 +96,5 @@ def _write_json(report: Report, path: Path) -> None:
     write_json(path, report.record())
 
 
-def _tell(what: str) -> None:
+def _report(what: str) -> None:
     sys.stderr.write(f"fusion reproduce: {what}\n")

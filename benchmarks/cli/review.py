@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from benchmarks.review.listing import told
+from benchmarks.review.listing import as_lines
 from benchmarks.review.review import PREFIX, SCENE, review
 from benchmarks.review.reviewed_run import own_log, remarks
 from benchmarks.review.scene import SUFFIX
@@ -41,7 +41,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--worst", type=at_least_one, default=0, metavar="K", help="list the K worst moments of each estimator"
     )
     parser.add_argument(
-        "--without", action="append", default=[], metavar="ANCHOR", help="what if it had never been heard; repeatable"
+        "--without", action="append", default=[], metavar="ANCHOR", help="as if it had never been received; repeatable"
     )
     parser.add_argument(
         "--reject",
@@ -49,13 +49,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=since_start,
         default=[],
         metavar="S",
-        help="what if the radio measurement nearest to that time had been refused; repeatable",
+        help="as if the radio measurement nearest to that time had been refused; repeatable",
     )
     parser.add_argument("--seed", type=not_negative, default=0, help="of the estimators that draw random numbers")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Draw, and say where to; list the worst moments."""
+    """Draw, print the places of the files, list the worst moments."""
     if arguments.web and arguments.save is not None and arguments.save.suffix != SUFFIX:
         # The web viewer forgets the layout when a second file follows the one that brings it.
         raise ParameterError(f"--web shows one file, not a folder of layers; give --save {arguments.save}{SUFFIX}")
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
         for written in ([] if arguments.save is None else made.files) + [arguments.png] * (arguments.png is not None):
             sys.stdout.write(f"{written}\n")
-        sys.stdout.writelines(told(made.moments, [*words(arguments)], settings, arguments.seed))
+        sys.stdout.writelines(as_lines(made.moments, [*words(arguments)], settings, arguments.seed))
         if arguments.web:
             _serve(made.files, arguments.at)
     return 0
@@ -99,7 +99,7 @@ def _serve(files: Sequence[Path], at_s: float | None) -> None:
 
 
 def subject_options(parser: argparse.ArgumentParser) -> None:
-    """Which run, and what a foreign one does not say by itself."""
+    """The run, and the options of a foreign one."""
     parser.add_argument("run", type=Path, metavar="RUN", help="an MCAP log, a ROS 2 bag, or with --suite a run's id")
     bag_options(parser.add_argument_group("a ROS 2 bag that is no log of ours (docs/import.md)"))
     parser.add_argument("--suite", type=Path, metavar="SUITE", help="RUN is the id of a run of this suite")
@@ -126,7 +126,7 @@ def subject(arguments: argparse.Namespace) -> Run:
     options = given_options(arguments)
     if arguments.suite is not None:
         if options:
-            raise ParameterError("--suite says already how its bags are read; leave --world, --topic and the like out")
+            raise ParameterError("--suite determines how its bags are read; leave --world, --topic and the like out")
         suite = load_suite(arguments.suite)
         return open_run(suite.run(str(arguments.run)), suite.folder)
     if options:

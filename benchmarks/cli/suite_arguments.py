@@ -8,14 +8,15 @@ from pathlib import Path
 
 from benchmarks.metrics.families import families
 from benchmarks.runner.plan import cells_of
-from benchmarks.runner.results import Result, read_results, refuse_incomplete
+from benchmarks.runner.results import Result, read_results
 from benchmarks.runner.store import STORE, Store
 from benchmarks.runner.suite import Suite
 from benchmarks.runner.suite_file import load_suite
+from fusion import SuiteError
 
 
 def suite_options(parser: argparse.ArgumentParser) -> None:
-    """What every verb of a suite takes."""
+    """The arguments of every verb of a suite."""
     parser.add_argument(
         "suite",
         type=Path,
@@ -39,5 +40,6 @@ def stored_results(arguments: argparse.Namespace) -> tuple[Suite, list[Result]]:
     cells = cells_of(suite, store)
     results = read_results(cells, store)
     if len(results) < len(cells):
-        refuse_incomplete(suite, len(results), len(cells))
+        have = f"{suite.name}: {len(results)} of {len(cells)} cells are there"
+        raise SuiteError(f"{have}; run `fusion bench run` first")
     return suite, results

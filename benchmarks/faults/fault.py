@@ -55,7 +55,7 @@ class Fault(ABC):
 
     @property
     def lasts(self) -> Windows:
-        """When it acts; empty for one that lasts the whole run, or never acts."""
+        """Windows in which it acts; empty for one that lasts the whole run, or never acts."""
         windows: Windows | None = getattr(self, "windows", None)
         return windows or ()
 
@@ -71,11 +71,7 @@ CHECKS: tuple[tuple[tuple[str, ...], Callable[[Any], bool], str], ...] = (
         lambda number: number >= 0.0,
         "not be negative",
     ),
-    (
-        ("windows",),
-        _are_windows,
-        "be stretches [begin, end] in seconds from the run's start, the end after the begin",
-    ),
+    (("windows",), _are_windows, "be stretches [begin, end] in seconds from the run's start, the end after the begin"),
     (("span",), lambda span: span[0] < span[1], "be [lowest, highest]"),
 )
 """Names of options, the values that are allowed, and the words for that."""

@@ -72,7 +72,7 @@ def faulty_columns(run: Run, faults: Sequence[Fault], *, suite_seed: int, fault_
 
 
 def outages(faults: Sequence[Fault]) -> Windows:
-    """When any of ``faults`` that do not last the whole run acts, in order; those that overlap or touch are one."""
+    """Windows of all ``faults`` that do not last the whole run, in order; those that overlap or touch are one."""
     merged: list[tuple[float, float]] = []
     for begin, end in sorted(window for fault in faults for window in fault.lasts):
         if merged and begin <= merged[-1][1]:

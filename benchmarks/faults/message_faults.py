@@ -52,7 +52,7 @@ class Drop(Fault):
 
 
 def _bad(change: Floats, p_enter: float, p_exit: float) -> Mask:
-    """Whether the channel is bad at each of (n,) uniform draws in a row."""
+    """True where the channel is bad, at each of (n,) uniform draws in a row."""
 
     def states() -> Iterator[bool]:
         bad = False

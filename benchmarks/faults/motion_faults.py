@@ -52,11 +52,11 @@ def _wheel_indices(wheel: str, columns: RunColumns) -> NDArray[np.int64]:
     if not wheel:
         return np.arange(columns.roll.shape[1])
     drive = columns.run.world.robot.drive
-    found = [set(wheel.split("_")) <= set(name.split("_")) for name in WHEELS[drive]]
-    if not any(found):
+    matches = [set(wheel.split("_")) <= set(name.split("_")) for name in WHEELS[drive]]
+    if not any(matches):
         known = ", ".join(WHEELS[drive]) or "no wheels"
         raise ParameterError(f"the run has no wheel {wheel!r}; its {drive} drive has {known}")
-    return np.flatnonzero(found)
+    return np.flatnonzero(matches)
 
 
 @dataclass(frozen=True, slots=True)

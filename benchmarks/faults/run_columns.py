@@ -66,7 +66,7 @@ class RunColumns:
         self.readings = self._rows([TOPICS[type(m)] for _, m, _ in radio], [r.anchor for _, _, r in radio], self.owner)
 
     def rows(self, topic: str, source: str) -> RowSelection:
-        """Where to find ``source``: readings for an anchor, else messages; raises `ParameterError` for neither."""
+        """The rows that hold ``source``: readings for an anchor, else messages; raises `ParameterError` for neither."""
         anchors, sensors = self.readings.sources(topic), self.messages.sources(topic)
         if source and sensors and source not in anchors + sensors:
             raise ParameterError(f"the run has no {source!r} on {topic}; {it_has(source, anchors + sensors)}")

@@ -1,7 +1,7 @@
-"""Where anchors should stand: the least error of a fix all over the floor, and what would change it most.
+"""Placement of anchors: the least error of a fix all over the floor, and the changes that lower it most.
 
 The criterion is the 95th percentile over the floor of `benchmarks.metrics.bound.fix_error`: a place where the bound is
-undefined counts as an infinite error. Every anchor is taken to be heard everywhere; walls do not enter.
+undefined counts as an infinite error. Every anchor is taken to be received everywhere; walls do not enter.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.limits.fix_bound import (
-    AS_TOLD,
+    AS_STATED,
     Floats,
     Places,
     Shared,
@@ -39,11 +39,11 @@ NEW = "new"
 
 
 class Readings(NamedTuple):
-    """What a fix is made from: ``scans`` readings of every anchor, all of one kind, from one place."""
+    """Readings of a fix: ``scans`` readings of every anchor, all of one kind, from one place."""
 
     radio: RadioKind
     scans: int = 1
-    shared: Shared = AS_TOLD
+    shared: Shared = AS_STATED
 
 
 class Grid(NamedTuple):
@@ -137,12 +137,12 @@ def new_anchor(world: World) -> Anchor:
 def best_addition(
     world: World, readings: Readings, places: Places, progress: Progress | None = None
 ) -> Proposal | None:
-    """Where one more anchor lowers the criterion most; None where nowhere on the floor does it lower it at all."""
+    """One more anchor where it lowers the criterion most; None where it lowers it nowhere on the floor."""
     return _best(world, readings, places, [new_anchor(world)], progress)
 
 
 def best_move(world: World, readings: Readings, places: Places, progress: Progress | None = None) -> Proposal | None:
-    """Which anchor to move where, its height kept; None where no move lowers the criterion."""
+    """The best move of one anchor, its height kept; None where no move lowers the criterion."""
     return _best(world, readings, places, world.anchors, progress)
 
 

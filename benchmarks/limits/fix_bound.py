@@ -1,13 +1,13 @@
-"""What no unbiased method can beat: the Cramer-Rao bound of a position fix, at one place or at thousands at once.
+"""Cramer-Rao bound of a position fix, which no unbiased method can beat, at one place or at thousands at once.
 
 Fisher's information of independent Gaussian readings is the sum of h hᵀ / variance, h the derivatives of the expected
 reading by what is not known (Kay 1993, section 3.9; Patwari et al. 2003, section III, for signal strength). Here that
 is the position, and two errors that the readings of all anchors share: an offset (a receiver that reads 3 dB low, a
 clock that is late) and the gain (path-loss exponent, scale of ranges). Both are taken out by Schur complement, so
-what is left is information on the position alone, with no more known of the two than the standard deviations say.
+what is left is information on the position alone, with no more known of the two than the standard deviations state.
 Each anchor's own common error is inside its variance: n readings have 1 / (std^2 / n + bias_std^2) between them.
 
-The bound is local: it says nothing of the mirror image that two anchors leave. Priors and motion can beat it;
+The bound is local: it does not include the mirror image that two anchors leave. Priors and motion can beat it;
 `benchmarks.limits.posterior_bound` is the bound of a filter.
 """
 
@@ -25,14 +25,14 @@ from fusion.radio import RadioKind
 
 Floats = NDArray[np.float64]
 
-POSITION, OFFSET, GAIN = slice(0, 2), 2, 3
-"""Rows and columns of an information matrix."""
+POSITION, OFFSET = slice(0, 2), 2
+"""Rows and columns of an information matrix; the gain follows the offset."""
 SINGULAR = 1e-12
 """A determinant below this share of what it would be with all directions alike is rounding: nothing is known."""
 
 
 class Places(NamedTuple):
-    """Where the robot's antenna is: x, y of any one shape (...), and its height above the floor; all [m], map frame."""
+    """Places of the robot's antenna: x, y of any one shape (...), and height above the floor; all [m], map frame."""
 
     x: Floats
     y: Floats
@@ -47,28 +47,28 @@ class Places(NamedTuple):
 
 
 class Shared(NamedTuple):
-    """How well the errors that all anchors share are known: one standard deviation, 0 known, infinite not at all.
+    """Standard deviations of the errors that all anchors share: 0 known, infinite not known at all.
 
-    ``offset_std`` [dB or m]; ``gain_std`` None: what each anchor's model says.
+    ``offset_std`` [dB or m]; ``gain_std`` None: that of each anchor's model.
     """
 
     offset_std: float = 0.0
     gain_std: float | None = None
 
 
-AS_TOLD = Shared()
-"""No common offset, and the gain as well known as the world says."""
+AS_STATED = Shared()
+"""No common offset, and the gain as well known as the world states."""
 
 
 def anchor_information(
-    anchors: Sequence[Anchor], places: Places, radio: RadioKind, *, scans: int = 1, shared: Shared = AS_TOLD
+    anchors: Sequence[Anchor], places: Places, radio: RadioKind, *, scans: int = 1, shared: Shared = AS_STATED
 ) -> Floats:
-    """What ``scans`` readings of each anchor, all from one place, say: (m, ..., 4, 4), to be summed over anchors.
+    """Information of ``scans`` readings of each anchor, all from one place: (m, ..., 4, 4), to be summed over anchors.
 
     Rows: x, y [1/m], then offset and gain, each in units of its standard deviation (as it stands, where infinite).
     """
-    found = np.empty((len(anchors), *np.shape(places.x), 4, 4))
-    for own, anchor in zip(found, anchors, strict=True):
+    information = np.empty((len(anchors), *np.shape(places.x), 4, 4))
+    for own, anchor in zip(information, anchors, strict=True):
         model, (ux, uy, distance) = anchor.model(radio), _sight(anchor, places)
         slope = model.slope(distance)
         gain_std = model.gain_std if shared.gain_std is None else shared.gain_std
@@ -76,7 +76,7 @@ def anchor_information(
         derivatives = np.stack([slope * ux, slope * uy, offset, model.by_gain(distance) * _unit(gain_std)], axis=-1)
         variance = model.std**2 / scans + model.bias_std**2
         own[...] = derivatives[..., :, None] * derivatives[..., None, :] / variance
-    return found
+    return information
 
 
 def _sight(anchor: Anchor, places: Places) -> tuple[Floats, Floats, Floats]:
@@ -90,10 +90,10 @@ def _unit(std: float) -> float:
     return std if math.isfinite(std) else 1.0
 
 
-def position_information(information: Floats, shared: Shared = AS_TOLD) -> Floats:
+def position_information(information: Floats, shared: Shared = AS_STATED) -> Floats:
     """Summed `anchor_information` (..., 4, 4) without offset and gain: (..., 2, 2) [1/m^2].
 
-    NaN where those two, both unknown, cannot be told apart, as at equal distance from all anchors.
+    NaN where those two, both unknown, cannot be separated, as at equal distance from all anchors.
     """
     own, crossed = information[..., POSITION, POSITION], information[..., POSITION, OFFSET:]
     known = np.diag([float(math.isfinite(shared.offset_std)), float(math.isfinite(shared.gain_std or 0.0))])
@@ -102,10 +102,10 @@ def position_information(information: Floats, shared: Shared = AS_TOLD) -> Float
     return np.asarray(own - crossed @ inverse @ np.swapaxes(crossed, -1, -2))
 
 
-def fix_covariance(information: Floats, shared: Shared = AS_TOLD) -> Floats:
+def fix_covariance(information: Floats, shared: Shared = AS_STATED) -> Floats:
     """Least covariance (..., 2, 2) [m^2] of an unbiased fix, from `anchor_information` summed over anchors (..., 4, 4).
 
-    NaN where the bound is undefined: some direction, or what would tell the shared errors apart, is not measured.
+    NaN where the bound is undefined: some direction, or one that would separate the shared errors, is not measured.
     """
     # Rounding leaves of nothing what is small beside what was there before the complement.
     return _inverse(position_information(information, shared), _alike(information[..., POSITION, POSITION]))
@@ -125,7 +125,7 @@ def _inverse(matrix: Floats, scale: Floats) -> Floats:
 
 
 def fix_error(
-    anchors: Sequence[Anchor], places: Places, radio: RadioKind, *, scans: int = 1, shared: Shared = AS_TOLD
+    anchors: Sequence[Anchor], places: Places, radio: RadioKind, *, scans: int = 1, shared: Shared = AS_STATED
 ) -> Floats:
     """Least root mean square error (...) [m] of an unbiased fix: the root of the trace of `fix_covariance`."""
     information = anchor_information(anchors, places, radio, scans=scans, shared=shared).sum(axis=0)
@@ -159,7 +159,7 @@ def dilution(anchors: Sequence[Anchor], places: Places) -> Dilution:
 def rssi_fix_bound(world: World, x: float, y: float, heading: float = 0.0) -> Floats:
     """Least covariance (2, 2) [m^2] of a position fix from one scan at a pose (map frame; [m], [rad]).
 
-    The noise is what the world says: shadowing, a common error of each anchor's readings, and of the exponent.
+    The noise is the one of the world: shadowing, a common error of each anchor's readings, and of the exponent.
 
     >>> square = [{"id": n, "position_m": p} for n, p in zip("abcd", ([0, 0], [10, 0], [10, 10], [0, 10]))]
     >>> radio = {"path_loss_exponent": 3.0, "shadowing_std_db": 4.0, "bias_std_db": 0.0}

@@ -100,14 +100,14 @@ def _label_places(plan: Plan, lines: Sequence[Sequence[Floats]]) -> list[tuple[f
     """One place on the longest line of each level, as far from anchors, edges and earlier labels as it goes."""
     bounds = plan.world.bounds
     crowd = [(anchor.x, anchor.y) for anchor in plan.world.anchors]
-    found: list[tuple[float, float]] = []
+    labels: list[tuple[float, float]] = []
     for line in (max(level, key=len) for level in lines if any(map(len, level))):
         x, y = line.T
         room = np.min([x - bounds.x_min, bounds.x_max - x, y - bounds.y_min, bounds.y_max - y], axis=0)
-        near = np.min([np.hypot(x - left, y - up) for left, up in [*crowd, *found]], axis=0)
+        near = np.min([np.hypot(x - left, y - up) for left, up in [*crowd, *labels]], axis=0)
         best = int(np.argmax(np.minimum(room, near)))
-        found.append((float(x[best]), float(y[best])))
-    return found
+        labels.append((float(x[best]), float(y[best])))
+    return labels
 
 
 def _walls(axes: Axes, plan: Plan) -> None:
@@ -138,7 +138,7 @@ def _anchors(axes: Axes, plan: Plan) -> None:
 
 
 def _scale(count: int) -> float:
-    """How large so many anchors and their names are drawn: as ever up to a dozen, then smaller, but to be read."""
+    """Sizes of markers and names for so many anchors: the usual ones up to a dozen, then smaller, but legible."""
     return float(np.clip(np.sqrt(12.0 / count), 0.55, 1.0))
 
 

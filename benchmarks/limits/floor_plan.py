@@ -28,7 +28,7 @@ from fusion.radio import RadioKind
 from fusion.trilateration import are_collinear
 
 LIMIT_M = 1.0
-"""The share of the floor with a lower error is told."""
+"""Error whose share of the floor is reported [m]."""
 MOST_CELLS = 100_000
 """A finer floor than this is a slip of the finger, and would fill the memory."""
 
@@ -38,8 +38,7 @@ class Plan:
     """The least error of a fix all over a floor, and what would change it.
 
     ``error_m`` (ny, nx) [m], NaN where undefined, belongs to ``grid``. ``hdop`` likewise, for ranges, else None.
-    ``proposals``: what was asked for and found, one more anchor before the move. ``remarks``: what the numbers cannot
-    say.
+    ``proposals``: the changes asked for, one more anchor before the move. ``remarks``: cautions beside the numbers.
     """
 
     world: World
@@ -70,7 +69,7 @@ class Plan:
 
 
 def title(plan: Plan) -> str:
-    """What the plan shows, in one line."""
+    """Title of the plan, in one line."""
     return f"{plan.world.name}, {plan.readings.radio}: least error of a fix"
 
 
@@ -102,7 +101,7 @@ def plan_site(
     readings, grid = Readings(radio, scans, Shared(offset_std)), _grid(world, step_m)
     places = grid.places(world.robot.antenna_m[2])
     searches = [search for search, wanted in ((best_addition, add), (best_move, move)) if wanted]
-    found = [search(world, readings, places, progress) for search in searches]
+    proposals = [search(world, readings, places, progress) for search in searches]
     error_m = error_map(world.anchors, readings, places)
     return Plan(
         world,
@@ -112,8 +111,8 @@ def plan_site(
         error_m,
         dilution(world.anchors, places).hdop if radio == "range" else None,
         losses(world.anchors, readings, places),
-        tuple(proposal for proposal in found if proposal is not None),
-        (*remarks, *_cautions(world, error_m, found)),
+        tuple(proposal for proposal in proposals if proposal is not None),
+        (*remarks, *_cautions(world, error_m, proposals)),
     )
 
 
@@ -145,22 +144,24 @@ def _check_anchors(world: World) -> None:
         )
 
 
-def _cautions(world: World, error_m: Floats, found: Sequence[Proposal | None]) -> list[str]:
-    told = []
+def _cautions(world: World, error_m: Floats, proposals: Sequence[Proposal | None]) -> list[str]:
+    cautions = []
     if len(world.anchors) == 2:
-        told.append("two anchors leave two mirror images of every fix; the bound is the error around the right one")
+        cautions.append("two anchors leave two mirror images of every fix; the bound is the error around the right one")
     vital = [anchor.id for anchor in world.anchors if _leaves_a_line(world, anchor)]
     if vital:
-        told.append(f"without {' or '.join(vital)} every fix has a mirror image, which the bound does not see")
+        cautions.append(f"without {' or '.join(vital)} every fix has a mirror image, which the bound does not see")
     undefined = np.isnan(error_m)
     if undefined.any():
-        told.append(f"the bound is undefined on {undefined.mean():.1%} of the floor: there a direction is not measured")
-    if None in found:
-        told.append("no place on the floor would lower the error for 95 % of it")
-    return told
+        cautions.append(
+            f"the bound is undefined on {undefined.mean():.1%} of the floor: there a direction is not measured"
+        )
+    if None in proposals:
+        cautions.append("no place on the floor would lower the error for 95 % of it")
+    return cautions
 
 
 def _leaves_a_line(world: World, silent: Anchor) -> bool:
-    """Whether the other anchors, two or more, stand on one line."""
+    """True where the other anchors, two or more, stand on one line."""
     rest = np.array([(anchor.x, anchor.y) for anchor in world.anchors if anchor is not silent])
     return len(rest) >= 2 and are_collinear(rest)

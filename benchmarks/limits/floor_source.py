@@ -1,4 +1,4 @@
-"""What a site is read from: a world file, a scenario or a log, and which radios are in use there."""
+"""Sources of a site: a world file, a scenario or a log, and the radios in use there."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sensors.simulation.scenario import load_scenario
 
 
 class Site(NamedTuple):
-    """A world, and which radios are in use there; none where its source says nothing of that."""
+    """A world, and which radios are in use there; none where its source has nothing of that."""
 
     world: World
     radios: frozenset[RadioKind]
@@ -33,12 +33,12 @@ def load_site(source: str | Path) -> Site:
         return Site(scenario.world, _radios(reality.wifi_hz or reality.scans_at_stop, reality.range_hz))
     world = World.load(path)
     table = json.loads(world.table)
-    told = [table, *table.get("anchors", ())]
-    return Site(world, _radios(any("radio" in part for part in told), any("ranging" in part for part in told)))
+    parts = [table, *table.get("anchors", ())]
+    return Site(world, _radios(any("radio" in part for part in parts), any("ranging" in part for part in parts)))
 
 
 def _is_scenario(path: Path) -> bool:
-    """A scenario holds its world in a table; a file that cannot be read is left to the reader of worlds to tell."""
+    """A scenario holds its world in a table; a file that cannot be read is left to the reader of worlds to refuse."""
     try:
         return isinstance(tomllib.loads(path.read_text(encoding="utf-8")).get("world"), dict)
     except (OSError, ValueError):
@@ -46,12 +46,12 @@ def _is_scenario(path: Path) -> bool:
 
 
 def _radios(rssi: float, ranges: float) -> frozenset[RadioKind]:
-    found: list[tuple[RadioKind, float]] = [("rssi", rssi), ("range", ranges)]
-    return frozenset(radio for radio, used in found if used)
+    radios: list[tuple[RadioKind, float]] = [("rssi", rssi), ("range", ranges)]
+    return frozenset(radio for radio, used in radios if used)
 
 
 def choose_radio(radios: frozenset[RadioKind]) -> tuple[RadioKind, str]:
-    """The one radio in use, or else signal strength; and the sentence that says so."""
+    """The one radio in use, or else signal strength; and a sentence about the choice."""
     if len(radios) == 1:
         (radio,) = radios
         return radio, f"{radio} readings, the only kind this site has"

@@ -9,15 +9,15 @@ from pathlib import Path
 from benchmarks.limits.anchor_placement import Proposal, Spread
 from benchmarks.limits.floor_plan import Plan, title
 from fusion.output.files import write_json
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 
 MOST_LOSSES = 12
 """Anchors in the table of what the loss of one costs; the record has them all."""
 
 
-def sheets(plan: Plan) -> list[Sheet]:
-    """What the floor allows, what the loss of an anchor costs, and the best changes found."""
-    # Of many anchors those that would be missed most: nobody reads a hundred lines that say 1.00.
+def tables(plan: Plan) -> list[Table]:
+    """Errors over the floor, the cost of the loss of each anchor, and the best changes."""
+    # Of many anchors those that would be missed most: a hundred lines of 1.00 help nobody.
     vital = sorted(plan.losses, key=lambda name: -plan.losses[name].p95_m)[:MOST_LOSSES]
     losses = tuple(
         (name, *_errors(spread), _number(_ratio(spread.p95_m, plan.spread.p95_m)))
@@ -25,16 +25,16 @@ def sheets(plan: Plan) -> list[Sheet]:
         if name in vital
     )
     worst = f" (the worst {len(vital)} of {len(plan.losses)})" if len(vital) < len(plan.losses) else ""
-    found = [
-        Sheet(title(plan), ("over the floor", ""), tuple(_floor_rows(plan))),
-        Sheet(f"When one anchor falls silent{worst}", ("silent", "median m", "p95 m", "worst m", "p95 times"), losses),
+    shown = [
+        Table(title(plan), ("over the floor", ""), tuple(_floor_rows(plan))),
+        Table(f"When one anchor falls silent{worst}", ("silent", "median m", "p95 m", "worst m", "p95 times"), losses),
     ]
     if plan.proposals:
         rows = tuple(
             (describe(plan, each), *_errors(each.spread), _number(gain_m(plan, each))) for each in plan.proposals
         )
-        found.append(Sheet("The best change", ("change", "median m", "p95 m", "worst m", "p95 gain m"), rows))
-    return found
+        shown.append(Table("The best change", ("change", "median m", "p95 m", "worst m", "p95 gain m"), rows))
+    return shown
 
 
 def _floor_rows(plan: Plan) -> Iterator[tuple[str, str]]:
@@ -64,7 +64,7 @@ def _ratio(value: float, beside: float) -> float:
 
 
 def gain_m(plan: Plan, proposal: Proposal) -> float:
-    """How much lower the error is that 95 % of the floor stays below [m]; infinite where it had no limit."""
+    """Decrease of the error that 95 % of the floor stays below [m]; infinite where it had no limit."""
     return plan.spread.p95_m - proposal.spread.p95_m
 
 

@@ -1,4 +1,4 @@
-"""What no filter can beat on one run: the posterior Cramer-Rao bound (Tichavsky, Muravchik & Nehorai 1998).
+"""Posterior Cramer-Rao bound, which no filter can beat on one run (Tichavsky, Muravchik & Nehorai 1998).
 
 For additive Gaussian noise the recursion of the information J is
 
@@ -6,8 +6,8 @@ For additive Gaussian noise the recursion of the information J is
 
 and is kept here as the covariance J^-1, which lets Q and the prior be singular. It is written as an estimator that
 knows the truth, so that the host gives it exactly what it gives every other: readings screened and put in order,
-ticks and gyro as odometry, motion held up to each reading. State: pose, and the errors that the world says stay the
-same for a whole run: odometry's calibration, the gain of each radio, the common error of each anchor.
+ticks and gyro as odometry, motion held up to each reading. State: pose, and the errors that the world states to stay
+the same for a whole run: odometry's calibration, the gain of each radio, the common error of each anchor.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def posterior_bound(run: Run) -> Limit:
     """The bound of every filter at the instants at which estimators are scored (`evaluation_instants`).
 
     Readings count from their own time on, however late they came. NaN before the prior, and from the first motion on
-    whose true heading is not known: all NaN for a truth that tells none. Raises `LogError` without truth.
+    whose true heading is not known: all NaN for a truth that has none. Raises `LogError` without truth.
     """
     if run.truth is None or not np.isfinite(run.truth.x + run.truth.y).any():
         raise LogError(f"{run.path}: holds no ground truth, and the bound is taken there; give a run with truth")
@@ -73,13 +73,13 @@ def posterior_bound(run: Run) -> Limit:
 
 
 def eff_pcrlb(error_m: Floats, bound_m: Floats) -> float:
-    """How many times the limit a filter errs: the mean over time of RMSE over seeds / bound; (seeds, n) [m] each.
+    """Ratio of a filter's error to the limit: the mean over time of RMSE over seeds / bound; (seeds, n) [m] each.
 
     The bound of an instant is the root mean square over seeds. Answers that are not valid (infinite) are left out,
     and so are instants without any, or without a bound above zero: read it beside the availability. NaN where nothing
     is left. With one seed an efficient filter reads about 0.89, not 1: the mean of a Rayleigh variable over its root
-    mean square. Well below 1, a prior better than claimed, tuning on the test data, noise less than the world says,
-    or a fault is at work.
+    mean square. Well below 1, a prior better than claimed, tuning on the test data, noise less than the world
+    states, or a fault is at work.
     """
     valid = np.isfinite(error_m)
     counts = valid.sum(axis=0)

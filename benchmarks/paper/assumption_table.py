@@ -1,4 +1,4 @@
-"""Every assumption by name: what is the paper's, what was chosen by hand, what was calibrated."""
+"""Every assumption by name: those of the paper, those chosen by hand, those calibrated."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.interpretations import literal
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 from sensors.simulation.scenario import Scenario
 
 PAPER, CHOSEN, CALIBRATED, READ = "paper", "chosen", "calibrated", "open, read so"
@@ -45,16 +45,12 @@ ROWS: tuple[Row, ...] = (
     ("floor, m", CHOSEN, _floor),
     ("access points, m from the floor's corner, the origin", CHOSEN, _anchors),
     ("length of the path, m", CHOSEN, _path),
-    (
-        "speed, m/s, and turn on the spot, rad/s",
-        CHOSEN,
-        _speeds,
-    ),
+    ("speed, m/s, and turn on the spot, rad/s", CHOSEN, _speeds),
     ("effective track, m", CHOSEN, lambda s: f"{s.world.robot.track_width_m:g}"),
     ("direction of the wheels is known", CHOSEN, lambda s: "yes" if s.world.robot.encoder == "quadrature" else "no"),
     ("start: place known to, cm, and heading to, rad", CHOSEN, _start),
     ("distance counted too long, %", CALIBRATED, lambda s: f"{100.0 * s.reality.distance_scale_bias:.2f}"),
-    ("track wider than told, %", CALIBRATED, lambda s: f"{100.0 * s.reality.track_scale_bias:.2f}"),
+    ("track wider than stated, %", CALIBRATED, lambda s: f"{100.0 * s.reality.track_scale_bias:.2f}"),
     ("wheel slip each half second, σ, %", CALIBRATED, lambda s: f"{100.0 * s.reality.slip_std:.2f}"),
     ("shadowing χ, σ, dB", CALIBRATED, lambda s: f"{s.reality.shadowing_std_db:.2f}"),
     ("shadowing is alike over, m", CHOSEN, lambda s: f"{s.reality.shadowing_length_m:g}"),
@@ -68,9 +64,9 @@ ROWS: tuple[Row, ...] = (
 )
 
 
-def assumptions(outcomes: Sequence[Outcome]) -> Sheet:
+def assumptions(outcomes: Sequence[Outcome]) -> Table:
     """One row per assumption, one column per environment."""
-    rows = [(name, source, *(tell(outcome.scenario) for outcome in outcomes)) for name, source, tell in ROWS]
+    rows = [(name, source, *(value(outcome.scenario) for outcome in outcomes)) for name, source, value in ROWS]
     rows += [(name, READ, *([str(value)] * len(outcomes))) for name, value in literal().options.items()]
     head = ("assumption", "from", *(outcome.environment.short for outcome in outcomes))
-    return Sheet("Every assumption", head, tuple(rows), prose=True)
+    return Table("Every assumption", head, tuple(rows), prose=True)

@@ -1,4 +1,4 @@
-"""What the paper does not tell, filled in: the way the experiments are run, and other ways that would do as well.
+"""Assumptions where the paper gives none: the way the experiments are run, and other ways that would do as well.
 
 Two numbers of every filling are calibrated (`benchmarks.paper.fit_environments`): how strongly wheels err, as a factor
 on a fixed mixture of errors, and how strongly Wi-Fi does, in dB. The rest is chosen by hand and named here. A verdict
@@ -19,7 +19,7 @@ Feng 1996); one robot keeps them from run to run."""
 RANDOM_SLIP_STD = 0.02
 """The same where wheels only slip."""
 OBSTRUCTED_SHARE = 0.15
-"""How often a link is obstructed where obstructions rule."""
+"""Share of links that are obstructed where obstructions rule."""
 MANY_SCANS = 200
 """A stop, where the fading that 20 scans leave (0.23 dB) is too much: for fixes to be accurate between outliers, or for
 the Wi-Fi errors of the paper on a floor twice as large."""
@@ -35,27 +35,27 @@ class Filling(NamedTuple):
     floor_factor: float = 1.0
     """Every length of floor, anchors and route is multiplied by it."""
     systematic: bool = True
-    """Whether wheels err the same way in every run, or at random."""
+    """Wheels err the same way in every run, or at random."""
     obstructed: bool = False
-    """Whether Wi-Fi errs where something stands in the way, or everywhere, by shadowing."""
+    """Wi-Fi errs where something stands in the way, or everywhere, by shadowing."""
     shadowing_length_m: float | None = None
-    """None: as the scenario says."""
+    """None: as in the scenario."""
     scans_at_stop: int | None = None
 
     @property
     def drives_like_main(self) -> bool:
-        """Whether odometry knows no difference to the main filling, so that its calibration holds."""
+        """True where odometry is that of the main filling, so that its calibration holds."""
         return self.floor_factor == 1.0 and self.systematic
 
     @property
-    def hears_like_main(self) -> bool:
+    def receives_like_main(self) -> bool:
         """The same for Wi-Fi."""
         return self._replace(key=MAIN.key, title=MAIN.title, systematic=True) == MAIN
 
 
 MAIN = Filling("main", "as calibrated")
 PREMISE = Filling("obstructions", "obstructions", obstructed=True, scans_at_stop=MANY_SCANS)
-"""What section III-A presumes: fixes that are accurate but for outliers."""
+"""The premise of section III-A: fixes that are accurate but for outliers."""
 ALTERNATIVES = (
     Filling("small_floor", "half the floor", floor_factor=0.5),
     Filling("large_floor", "twice the floor", floor_factor=2.0, scans_at_stop=MANY_SCANS),
@@ -66,7 +66,7 @@ ALTERNATIVES = (
 
 
 def filled(table: Table, filling: Filling, odometry_factor: float, wifi_db: float) -> Table:
-    """The scenario with these errors in its reality, and with its world told how large they are.
+    """The scenario with these errors in its reality, and with a world that states how large they are.
 
     ``wifi_db`` is the standard deviation of shadowing, or the mean loss behind an obstruction.
     """
@@ -87,7 +87,7 @@ def filled(table: Table, filling: Filling, odometry_factor: float, wifi_db: floa
 
 
 def short(value: float) -> float:
-    """Four digits are more than calibration can tell."""
+    """Four digits are more than calibration can resolve."""
     return float(f"{value:.4g}")
 
 
@@ -112,7 +112,7 @@ def _rssi_std_db(reality: Table) -> float:
 
 
 def _odometry_noise(table: Table) -> dict[str, float]:
-    """What `OdometryNoise` should be for slipping wheels whose rounding to whole ticks comes anew on every leg."""
+    """The `OdometryNoise` of slipping wheels whose rounding to whole ticks comes anew on every leg."""
     reality, route, robot = table["reality"], table["route"], table["world"]["robot"]
     places = np.array(route["waypoints_m"])
     leg_m = float(np.hypot(*np.diff(places, axis=0).T).mean())

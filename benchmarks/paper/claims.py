@@ -1,4 +1,4 @@
-"""What the paper claims, each claim as a test that a run passes or fails, and the verdict over all runs."""
+"""The claims of the paper, each as a test that a run passes or fails, and the verdict over all runs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ARENA = EVERYWHERE[-1:]
 
 
 class Claim(NamedTuple):
-    """``holds`` answers for each run of an environment, (n,); ``reason`` says why, in words and numbers."""
+    """``holds`` answers for each run of an environment, (n,); ``reason`` explains that, in words and numbers."""
 
     key: str
     text: str
@@ -66,7 +66,7 @@ def verdict(shares: Sequence[Share]) -> str:
     """
     fewest = min(share.total for share in shares)
     if fewest < FEWEST_RUNS:
-        return f"cannot tell from {fewest} runs"
+        return f"inconclusive from {fewest} runs"
     if min(share.low for share in shares) >= NEARLY_ALWAYS:
         return REPRODUCED
     if max(share.high for share in shares) <= NEARLY_NEVER:

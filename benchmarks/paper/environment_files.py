@@ -28,7 +28,7 @@ def write_calibrated(
     scenarios: Path | None = None,
     seeds: range = SEEDS,
     workers: int = 1,
-    told: Callable[[str], None] = lambda _: None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> list[Path]:
     """Calibrate everything into ``folder``: the scenarios of the environments, and the numbers of the other fillings.
 
@@ -38,10 +38,10 @@ def write_calibrated(
     texts = {env.scenario: scenario_text(env.place(scenarios)) for env in ENVIRONMENTS}
     tables = {name: tomllib.loads(text) for name, text in texts.items()}
     solved: dict[Key, Solved] = {}
-    for (environment, filling, estimator), found in solve_all(tables, seeds, workers):
-        solved[environment.scenario, filling.key, estimator] = found
-        reached_cm = 100.0 * found.reached_m
-        told(f"{environment.title}, {filling.title}: {estimator} errs {reached_cm:.1f} cm at {found.value:g}")
+    for (environment, filling, estimator), number in solve_all(tables, seeds, workers):
+        solved[environment.scenario, filling.key, estimator] = number
+        reached_cm = 100.0 * number.reached_m
+        report(f"{environment.title}, {filling.title}: {estimator} errs {reached_cm:.1f} cm at {number.value:g}")
     written = [
         _write(folder / f"{environment.scenario}.toml", _main_text(environment, texts, tables, solved, seeds))
         for environment in ENVIRONMENTS
@@ -102,7 +102,7 @@ def _alternatives_text(solved: Mapping[Key, Solved], seeds: range) -> str:
         for filling in ALTERNATIVES:
             source = {
                 ODOMETRY: MAIN if filling.drives_like_main else filling,
-                WIFI: MAIN if filling.hears_like_main else filling,
+                WIFI: MAIN if filling.receives_like_main else filling,
             }
             numbers = {
                 estimator: solved[environment.scenario, each.key, estimator] for estimator, each in source.items()
@@ -135,7 +135,7 @@ def calibrated_alternative(environment: Environment, filling: Filling, scenarios
 
 
 def calibrated_numbers(environment: Environment, filling: Filling, scenarios: Path | None = None) -> dict[str, float]:
-    """What `write_calibrated` has found for another filling; raises `WorldError`."""
+    """The calibrated numbers of another filling; raises `WorldError`."""
     folder = resources.files("benchmarks").joinpath("paper") if scenarios is None else scenarios
     try:
         stored = tomllib.loads(folder.joinpath(ALTERNATIVES_FILE).read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""The evidence for each claim: whether a run keeps it, and the numbers that tell why."""
+"""The evidence for each claim: whether a run keeps it, and the numbers behind that."""
 
 from __future__ import annotations
 
@@ -95,24 +95,24 @@ def is_linear(outcome: Outcome) -> Held:
 
 
 def refused_share(outcome: Outcome) -> float:
-    """How many fixes the proposed method takes for outliers."""
+    """Share of fixes that the proposed method takes for outliers."""
     return float(outcome.refused.mean())
 
 
 def refused_though_better(outcome: Outcome) -> float:
-    """How many of those were nearer to the truth than its own answer then."""
+    """Share of those that were nearer to the truth than its own answer then."""
     better = outcome.euclidean(WIFI) < outcome.euclidean(PROPOSED)
     return float(better[outcome.refused].mean()) if outcome.refused.any() else 0.0
 
 
 def taken_though_worse(outcome: Outcome) -> float:
-    """How many of the fixes it takes were further from the truth than odometry alone."""
+    """Share of the fixes it takes that were further from the truth than odometry alone."""
     worse, taken = outcome.euclidean(WIFI) > outcome.euclidean(ODOMETRY), ~outcome.refused
     return float(worse[taken].mean()) if taken.any() else 0.0
 
 
-def _each(outcomes: Sequence[Outcome], tell: Callable[[Outcome], str]) -> str:
-    return ", ".join(f"{outcome.environment.short} {tell(outcome)}" for outcome in outcomes)
+def _each(outcomes: Sequence[Outcome], text: Callable[[Outcome], str]) -> str:
+    return ", ".join(f"{outcome.environment.short} {text(outcome)}" for outcome in outcomes)
 
 
 def _median_of(ratio: Callable[[Outcome], Floats]) -> Callable[[Outcome], str]:
@@ -128,7 +128,7 @@ def _proposed_cm(outcome: Outcome) -> str:
 
 
 def why_better_or_not(outcomes: Sequence[Outcome]) -> str:
-    """What the gate lets in and keeps out."""
+    """Shares of fixes that the gate takes and refuses."""
     return (
         f"Median ratio to the better of the two: {_each(outcomes, _median_of(_over_smaller))}. Of all fixes "
         f"{_each(outcomes, _percent(refused_share))} are refused; of those refused, "
@@ -162,7 +162,7 @@ def mean_and_maximum(outcomes: Sequence[Outcome]) -> str:
 
 
 def outlier_ratios(outcomes: Sequence[Outcome]) -> str:
-    """How much the largest Wi-Fi error stands out."""
+    """Ratio of the largest Wi-Fi error to the median one."""
     return (
         f"Largest over median error, median run: {_each(outcomes, _median_of(_outlier_ratio))}. The shadowing of eq. 3 "
         "is Gaussian and the same everywhere: its errors have no second kind, only a largest among more or fewer."
@@ -170,12 +170,12 @@ def outlier_ratios(outcomes: Sequence[Outcome]) -> str:
 
 
 def growth(outcomes: Sequence[Outcome]) -> str:
-    """How odometry's error grows."""
+    """Growth of odometry's error."""
     return f"Last third over first third, median run: {_each(outcomes, _median_of(_growth))}."
 
 
 def linearity(outcomes: Sequence[Outcome]) -> str:
-    """How straight the line is."""
+    """Straightness of the line."""
     return (
         f"Smallest r² of a run: {_each(outcomes, lambda outcome: f'{outcome.moves_r2.min():.4f}')}. It holds by "
         "construction: our wheels err by a scale, by slip and by whole ticks."

@@ -25,13 +25,13 @@ from sensors.simulation.scenario import Scenario, load_scenario
 
 
 class Outcome(NamedTuple):
-    """What became of one environment, n seeds of p trial points [m].
+    """Outcome of one environment, n seeds of p trial points [m].
 
     ``errors``: (n, p, 2) by estimator, infinite without a valid answer. ``refused``: (n, p), whether the proposed
-    method took the fix for an outlier. ``readings``, ``missing``, ``origins``: (n, ...), its largest error by each.
-    ``moves``: (n, moves), straight ones as odometry measures them. ``alternatives``: largest errors (n,) by filling
-    and curve. ``bound``: (p, 2, 2) [m^2], least covariance of a radio fix at each trial point. ``crashes``: why, by
-    estimator, of the first run that crashed.
+    method took the fix for an outlier. ``interpretations``, ``missing``, ``origins``: (n, ...), its largest error by
+    each. ``moves``: (n, moves), straight ones as odometry measures them. ``alternatives``: largest errors (n,) by
+    filling and curve. ``bound``: (p, 2, 2) [m^2], least covariance of a radio fix at each trial point. ``crashes``: by
+    estimator, the error of the first run that crashed.
     """
 
     environment: Environment
@@ -39,7 +39,7 @@ class Outcome(NamedTuple):
     seeds: tuple[int, ...]
     errors: Mapping[str, Floats]
     refused: NDArray[np.bool_]
-    readings: Floats
+    interpretations: Floats
     missing: Floats
     origins: Floats
     moves: Floats
@@ -61,7 +61,7 @@ class Outcome(NamedTuple):
 
     @property
     def moves_r2(self) -> Floats:
-        """How straight a line actual over measured moves is, (n,)."""
+        """Coefficient of determination of actual over measured moves, (n,)."""
         return np.array([r_squared(measured) for measured in self.moves])
 
     @property
@@ -71,7 +71,7 @@ class Outcome(NamedTuple):
 
 
 class Job(NamedTuple):
-    """One run: what is made of it, of which scenario, from which seed."""
+    """One run: its work, its scenario and its seed."""
 
     work: Callable[[tuple[Any, int]], Any]
     scenario: str | Path | Scenario
@@ -101,13 +101,13 @@ def run_experiments(
             "scenarios were calibrated on; choose another --seed"
         )
     jobs = [job for environment in ENVIRONMENTS for job in _jobs(environment, seeds, scenarios, estimators)]
-    found: dict[int, Any] = {}
+    results: dict[int, Any] = {}
     for index, result in compute(_run, _died, jobs, workers):
-        found[index] = result
-        progress(len(found), len(jobs), "runs")
+        results[index] = result
+        progress(len(results), len(jobs), "runs")
     share = len(jobs) // len(ENVIRONMENTS)
     return tuple(
-        _outcome(environment, seeds, scenarios, [found[index] for index in range(k * share, (k + 1) * share)])
+        _outcome(environment, seeds, scenarios, [results[index] for index in range(k * share, (k + 1) * share)])
         for k, environment in enumerate(ENVIRONMENTS)
     )
 
@@ -141,7 +141,7 @@ def _outcome(environment: Environment, seeds: range, scenarios: Path | None, res
         tuple(seeds),
         {estimator: np.stack([trial.errors[estimator] for trial in trials]) for estimator in trials[0].errors},
         np.stack([trial.refused for trial in trials]),
-        np.stack([trial.readings for trial in trials]),
+        np.stack([trial.interpretations for trial in trials]),
         np.stack([trial.missing for trial in trials]),
         np.stack([trial.origins for trial in trials]),
         np.stack([trial.moves for trial in trials]),

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.metrics.score import CHI_SQUARE_95, quantile
 from benchmarks.paper.experiment import Outcome
-from benchmarks.paper.interpretations import ORIGINS_M, READINGS, SCALES
+from benchmarks.paper.interpretations import INTERPRETATIONS, ORIGINS_M, SCALES
 from benchmarks.paper.outlier_rule_examples import REPAIRED, lock_out_example
 from benchmarks.paper.published import ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.straight_moves import MOVES_M
@@ -45,7 +45,7 @@ def errors(outcomes: Sequence[Outcome]) -> Figure:
 
 
 def typical_run(outcome: Outcome) -> int:
-    """The run whose odometry and Wi-Fi maxima are nearest to the published ones; the proposed method has no say."""
+    """The run whose odometry and Wi-Fi maxima are nearest to the published ones; the proposed method does not count."""
     away = [
         np.abs(np.log(outcome.largest(estimator) / outcome.environment.maxima_m[estimator]))
         for estimator in (ODOMETRY, WIFI)
@@ -70,14 +70,14 @@ def estimators(outcomes: Sequence[Outcome]) -> Figure:
     return figure
 
 
-def readings(outcomes: Sequence[Outcome]) -> Figure:
-    """Median largest error of all readings, by what the percentage is of."""
+def interpretations(outcomes: Sequence[Outcome]) -> Figure:
+    """Median largest error of all interpretations, by the quantity that the percentage is of."""
     figure, row = panels(len(outcomes), 3.6)
     for axes, outcome in zip(row, outcomes, strict=True):
-        medians = np.array([100.0 * Spread.of(column).median for column in outcome.readings.T])
+        medians = np.array([100.0 * Spread.of(column).median for column in outcome.interpretations.T])
         for place, scale in enumerate(SCALES):
             for feedback, filled, shift in ((True, _colour(PROPOSED), -0.12), (False, "none", 0.12)):
-                own = [k for k, each in enumerate(READINGS) if each.values[:2] == (scale, feedback)]
+                own = [k for k, each in enumerate(INTERPRETATIONS) if each.values[:2] == (scale, feedback)]
                 where = np.full(len(own), place + shift)
                 named = None if place or axes is not row[0] else ("feedback" if feedback else "no feedback")
                 axes.scatter(where, medians[own], s=22, facecolor=filled, edgecolor=_colour(PROPOSED), label=named)
@@ -155,7 +155,7 @@ def moves(outcomes: Sequence[Outcome]) -> Figure:
 FIGURES: Mapping[str, Callable[[Sequence[Outcome]], Figure]] = {
     "errors": errors,
     "estimators": estimators,
-    "readings": readings,
+    "interpretations": interpretations,
     "weaknesses": weaknesses,
     "floors": floors,
     "moves": moves,

@@ -1,4 +1,4 @@
-"""Finds what the paper does not give, so that odometry alone and Wi-Fi alone err as much as the paper's did.
+"""Calibration of what the paper does not give, so that odometry alone and Wi-Fi alone err as much as the paper's did.
 
 Per environment and filling two numbers are solved for, each against one published maximum, and never against the
 proposed method's. The target is the median over `SEEDS` of the largest absolute coordinate error over the trial
@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.paper.assumptions import ALTERNATIVES, MAIN, Filling, Table, filled, short
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, WIFI, Environment
-from benchmarks.paper.trial import largest, track_errors
+from benchmarks.paper.trial import largest, point_errors
 from benchmarks.runner.estimator_run import run_estimator
 from benchmarks.runner.workers import TaskFailure, compute
 from fusion import FusionError
@@ -25,7 +25,7 @@ from sensors.simulation.simulate import simulated_run
 
 SEEDS = range(1_000_000, 1_000_400)
 BRACKETS = {ODOMETRY: (0.02, 8.0), WIFI: (0.01, 40.0)}
-"""Between which values the solution is looked for: a factor, and dB."""
+"""Brackets of the solution: a factor, and dB."""
 TOLERANCE = 0.01
 """Of the solution, as a share of it."""
 
@@ -57,7 +57,7 @@ def unknowns() -> list[Unknown]:
         Unknown(environment, filling, estimator)
         for environment in ENVIRONMENTS
         for filling, is_main in fillings
-        for estimator, like_main in ((ODOMETRY, filling.drives_like_main), (WIFI, filling.hears_like_main))
+        for estimator, like_main in ((ODOMETRY, filling.drives_like_main), (WIFI, filling.receives_like_main))
         if is_main or not like_main
     ]
 
@@ -69,11 +69,11 @@ def largest_error(unknown: Unknown, table: Table, value: float, seed: int) -> fl
     quiet["reality"]["gyro_hz"] = 0.0
     quiet["reality"] |= {"ticks_hz": 0.0} if unknown.estimator == WIFI else {"scans_at_stop": 1}
     run = simulated_run(Scenario.from_table(unknown.environment.scenario, quiet), seed)
-    return largest(track_errors(run, run_estimator(run, unknown.estimator, seed=seed)))
+    return largest(point_errors(run, run_estimator(run, unknown.estimator, seed=seed).track))
 
 
 def solve(task: tuple[Unknown, Table, range]) -> Solved:
-    """Where the median meets the target, to four digits, on a logarithmic scale (Brent 1973, chapter 4).
+    """The value at which the median meets the target, to four digits, on a logarithmic scale (Brent 1973, chapter 4).
 
     Each source of chance is drawn alike whatever the value, so the median moves smoothly with it. Deterministic.
     """
@@ -111,5 +111,5 @@ def solve_all(tables: Mapping[str, Table], seeds: range = SEEDS, workers: int = 
     """Every unknown as it is solved; ``tables`` holds the scenarios by name."""
     asked = unknowns()
     tasks = [(unknown, tables[unknown.environment.scenario], seeds) for unknown in asked]
-    for index, found in compute(solve, _died, tasks, workers):
-        yield asked[index], found
+    for index, solved in compute(solve, _died, tasks, workers):
+        yield asked[index], solved

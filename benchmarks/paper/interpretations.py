@@ -1,4 +1,4 @@
-"""What the paper leaves open about its algorithm, as one grid over the named options of ``dynamic_weight``."""
+"""Interpretations of the paper: all that it leaves open about its algorithm, as a grid over ``dynamic_weight``."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ runs with missing access points."""
 MISSING_OPTION = "missing_wifi"
 MISSING_VALUES = ("ignore", "count")
 ORIGINS_M: tuple[float | None, ...] = (None, 0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
-"""How far the floor is moved along both axes; None: until its middle is the origin."""
+"""Distances by which the floor is moved along both axes; None: until its middle is the origin."""
 
 
-class Reading(NamedTuple):
-    """One way to read the paper."""
+class Interpretation(NamedTuple):
+    """One interpretation of the paper, as values of `OPTIONS`."""
 
     values: tuple[object, ...]
 
@@ -38,7 +38,7 @@ class Reading(NamedTuple):
 
     @property
     def scale(self) -> str:
-        """What the percentage is of."""
+        """The quantity that the percentage is of."""
         return str(self.options[SCALE_OPTION])
 
     def __str__(self) -> str:
@@ -46,10 +46,10 @@ class Reading(NamedTuple):
         return f"of {relative_to}, {'' if feedback else 'no '}feedback, epsilon {epsilon}, raised to {raised}"
 
 
-READINGS = tuple(Reading(values) for values in itertools.product(*OPTIONS.values()))
+INTERPRETATIONS = tuple(Interpretation(values) for values in itertools.product(*OPTIONS.values()))
 
 
-def literal() -> Reading:
-    """The reading that the estimator's defaults are."""
+def literal() -> Interpretation:
+    """The interpretation of the estimator's defaults."""
     known = parameters(load(PROPOSED))
-    return Reading(tuple(known[name].default for name in OPTIONS))
+    return Interpretation(tuple(known[name].default for name in OPTIONS))

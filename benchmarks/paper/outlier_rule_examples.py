@@ -1,6 +1,6 @@
 """Two weaknesses of the published outlier rule, each by the smallest experiment that shows it. Nothing here is random.
 
-Ranges are exact, so every fix is where the robot stands, or where it is said to stand.
+Ranges are exact, so every fix is where the robot stands, or where it is supposed to stand.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ class Leg(NamedTuple):
 
 
 def origin_example() -> list[Moved]:
-    """Odometry says x = 2 m, the fix 2.5 m: an outlier, until the map's origin is moved."""
-    told = []
+    """Odometry gives x = 2 m, the fix 2.5 m: an outlier, until the map's origin is moved."""
+    moved = []
     for offset_m in OFFSETS_M:
         one = _Driven(PROPOSED, Pose(STANDS_M[0] + offset_m, STANDS_M[1] + offset_m, 0.0), offset_m)
         decision = one.fix(FIX_M[0] + offset_m, FIX_M[1] + offset_m)
         x = STANDS_M[0] + offset_m
         percent = 100.0 * (FIX_M[0] - STANDS_M[0]) / x
-        told.append(Moved(offset_m, x, percent, decision is Decision.REJECTED, one.pose.x - offset_m))
-    return told
+        moved.append(Moved(offset_m, x, percent, decision is Decision.REJECTED, one.pose.x - offset_m))
+    return moved
 
 
 def lock_out_example() -> list[Leg]:

@@ -23,18 +23,18 @@ PLACE = re.compile(r"\{\{(table|figure|text) (\w+)\}\}")
 
 
 def markdown(report: Report, figure_link: Callable[[str], str]) -> str:
-    """The page, with figures linked to as ``figure_link`` says."""
+    """The page, with figures linked to by ``figure_link``."""
     text = resources.files("benchmarks").joinpath("paper", "page.md").read_text(encoding="utf-8")
 
-    told = texts(report)
+    sentences = texts(report)
 
     def filled(place: re.Match[str]) -> str:
         kind, name = place.groups()
         if kind == "table":
-            return as_markdown(report.sheets[name])
+            return as_markdown(report.tables[name])
         if kind == "figure":
             return f"![{(FIGURES[name].__doc__ or name).splitlines()[0]}]({figure_link(name)})"
-        return told[name]
+        return sentences[name]
 
     return PLACE.sub(filled, text)
 
@@ -52,8 +52,8 @@ def texts(report: Report) -> dict[str, str]:
             for outcome in report.outcomes
         ),
         "nearest": (
-            f"Of {len(report.ranked)} readings the closest to the published maxima takes outliers in percent "
-            f"{nearest.reading}: off by a mean factor of {nearest.factor:.2f}."
+            f"Of {len(report.ranked)} interpretations the closest to the published maxima takes outliers in percent "
+            f"{nearest.interpretation}: off by a mean factor of {nearest.factor:.2f}."
         ),
     }
 

@@ -1,6 +1,6 @@
-"""What Moro & Mehrpouyan published (VTC-Fall 2019, arXiv 1911.03754, sections II and IV): every number, in SI units.
+"""Results of Moro & Mehrpouyan (VTC-Fall 2019, arXiv 1911.03754, sections II and IV): every number, in SI units.
 
-Their raw data were never published. Section IV says 80 cm where Table I says 81.
+Their raw data were never published. Section IV has 80 cm where Table I has 81.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Environment(NamedTuple):
         return {ODOMETRY: self.odometry_max_m, WIFI: self.wifi_max_m, PROPOSED: self.proposed_max_m}
 
     def place(self, scenarios: Path | None) -> str | Path:
-        """What `load_scenario` takes: the built-in scenario, or the one in a folder of one's own."""
+        """The argument of `load_scenario`: the built-in scenario, or the one in a folder of one's own."""
         return self.scenario if scenarios is None else scenarios / f"{self.scenario}.toml"
 
 

@@ -18,29 +18,29 @@ from benchmarks.paper.interpretations import ORIGINS_M
 from benchmarks.paper.outlier_rule_examples import lock_out_example, origin_example
 from benchmarks.paper.summary import Spread
 from fusion.arrays import Floats
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 
 
 class Report(NamedTuple):
-    """Outcomes per environment, what they say of each claim, all readings by closeness, and the tables by name."""
+    """Outcomes per environment, the verdict on each claim, all interpretations by closeness, and the tables by name."""
 
     outcomes: tuple[Outcome, ...]
     judged: tuple[Judged, ...]
     ranked: tuple[Ranked, ...]
-    sheets: Mapping[str, Sheet]
+    tables: Mapping[str, Table]
 
     @classmethod
     def of(cls, outcomes: Sequence[Outcome]) -> Report:
         """Everything that follows from the outcomes."""
         judged, ranked, matter = judge(outcomes), rank(outcomes), effects(outcomes)
-        sheets = {
+        by_name = {
             "maxima": tables.maxima(outcomes),
             "verdicts": tables.verdicts(judged, outcomes),
             "reasons": tables.reasons(judged),
             "table_1": tables.table_1(outcomes),
             "estimators": tables.estimators(outcomes),
             "bounds": tables.bounds(outcomes),
-            "readings": tables.readings(ranked, outcomes),
+            "interpretations": tables.interpretations(ranked, outcomes),
             "effects": tables.effects(matter, outcomes),
             "origin_example": tables.origin_example(origin_example()),
             "origins": tables.origins(outcomes),
@@ -48,11 +48,11 @@ class Report(NamedTuple):
             "alternatives": tables.alternatives(outcomes),
             "assumptions": assumptions(outcomes),
         }
-        return cls(tuple(outcomes), tuple(judged), tuple(ranked), sheets)
+        return cls(tuple(outcomes), tuple(judged), tuple(ranked), by_name)
 
     @property
     def remarks(self) -> list[str]:
-        """What the tables cannot say: why an estimator crashed."""
+        """Remarks beside the tables: the errors of estimators that crashed."""
         return [
             f"{outcome.environment.title}: {estimator} crashed: {why}"
             for outcome in self.outcomes
@@ -70,7 +70,7 @@ class Report(NamedTuple):
             "numpy": np.__version__,
             "environments": [_environment(outcome) for outcome in self.outcomes],
             "claims": [_claim(each) for each in self.judged],
-            "readings": [_reading(each) for each in self.ranked],
+            "readings": [_interpretation(each) for each in self.ranked],
         }
 
 
@@ -108,9 +108,9 @@ def _claim(judged: Judged) -> dict[str, object]:
     }
 
 
-def _reading(ranked: Ranked) -> dict[str, object]:
+def _interpretation(ranked: Ranked) -> dict[str, object]:
     return {
-        "options": ranked.reading.options,
+        "options": ranked.interpretation.options,
         "off_by_factor": _number(ranked.factor),
         "median_largest_m": _numbers(ranked.medians_m),
         "beats_both": [_number(share.value) for share in ranked.beats_both],

@@ -15,7 +15,7 @@ MOVES_M = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 2.75, 3.0)
 
 
 def measured_moves(scenario: Scenario, seed: int) -> Floats:
-    """What the wheels of this scenario's robot tell of the moves `MOVES_M`, driven one after another, (moves,) [m]."""
+    """The moves `MOVES_M`, driven one after another, as measured by the wheels of this robot, (moves,) [m]."""
     places = tuple((float(x), 0.0) for x in np.cumsum([0.0, *MOVES_M]))
     reality = replace(scenario.reality, gyro_hz=0.0)
     straight = replace(scenario, route=replace(scenario.route, waypoints_m=places), reality=reality)

@@ -1,4 +1,4 @@
-"""What many seeds say together: the middle and the spread of a number, and how often something held."""
+"""Statistics over many seeds: the middle and the spread of a number, and how often something held."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CLEARLY_M = 0.001
 
 
 def beats_both(errors_m: Floats, odometry_m: Floats, wifi_m: Floats) -> NDArray[np.bool_]:
-    """Whether errors [m] are clearly below those of odometry and those of Wi-Fi, run by run."""
+    """True where errors [m] are clearly below those of odometry and those of Wi-Fi, run by run."""
     return np.asarray(errors_m < np.minimum(odometry_m, wifi_m) - CLEARLY_M)
 
 
@@ -46,7 +46,7 @@ def runs_to_exclude(share: float, limit: float) -> float:
 
 
 class Share(NamedTuple):
-    """How often something held, with the 90 % interval of the probability behind it (Wilson 1927)."""
+    """Share of runs in which something held, with the 90 % interval of the probability behind it (Wilson 1927)."""
 
     held: int
     total: int

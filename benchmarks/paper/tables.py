@@ -16,7 +16,7 @@ from benchmarks.paper.outlier_rule_examples import Leg, Moved
 from benchmarks.paper.published import BISWAS_VELOSO, EKF, ODOMETRY, PROPOSED, TABLE_1, WIFI
 from benchmarks.paper.summary import Share, Spread, beats_both
 from fusion.arrays import Floats
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 
 CURVES = {ODOMETRY: "odometry", WIFI: "Wi-Fi", PROPOSED: "proposed"}
 """The paper's names."""
@@ -44,7 +44,7 @@ def percent(share: Share) -> str:
     return f"{100.0 * share.value:.0f} [{100.0 * share.low:.0f}, {100.0 * share.high:.0f}]"
 
 
-def maxima(outcomes: Sequence[Outcome]) -> Sheet:
+def maxima(outcomes: Sequence[Outcome]) -> Table:
     """Section IV: the largest error over the trial points, published and found."""
     rows = [
         (
@@ -58,10 +58,10 @@ def maxima(outcomes: Sequence[Outcome]) -> Sheet:
         for estimator, title in CURVES.items()
     ]
     head = ("largest error, cm", "paper", "ours, per coordinate", "ours, Euclidean")
-    return Sheet("Maximum error (section IV): median and 90 % interval over seeds", head, tuple(rows))
+    return Table("Maximum error (section IV): median and 90 % interval over seeds", head, tuple(rows))
 
 
-def verdicts(judged: Sequence[Judged], outcomes: Sequence[Outcome]) -> Sheet:
+def verdicts(judged: Sequence[Judged], outcomes: Sequence[Outcome]) -> Table:
     """Every claim, and in how many of the runs it holds."""
     environments = [outcome.environment for outcome in outcomes]
     rows = []
@@ -69,16 +69,16 @@ def verdicts(judged: Sequence[Judged], outcomes: Sequence[Outcome]) -> Sheet:
         held = (percent(shares[each.title]) if each.title in shares else "" for each in environments)
         rows.append((claim.text, *held, verdict))
     head = ("claim", *(f"{each.short}, %" for each in environments), "verdict")
-    return Sheet("Claims: share of runs in which each holds [90 % interval], and the verdict", head, tuple(rows))
+    return Table("Claims: share of runs in which each holds [90 % interval], and the verdict", head, tuple(rows))
 
 
-def reasons(judged: Sequence[Judged]) -> Sheet:
-    """How every claim is measured, and what decides it."""
+def reasons(judged: Sequence[Judged]) -> Table:
+    """The measure of every claim, and the reasons of its verdict."""
     rows = tuple((each.claim.text, each.claim.measured_as, each.reason) for each in judged)
-    return Sheet("Claims: how each is measured, and why", ("claim", "holds in a run when", "reason"), rows, prose=True)
+    return Table("Claims: how each is measured, and why", ("claim", "holds in a run when", "reason"), rows, prose=True)
 
 
-def table_1(outcomes: Sequence[Outcome]) -> Sheet:
+def table_1(outcomes: Sequence[Outcome]) -> Table:
     """Table I, which is about the arena: no other environment has such a maximum."""
     arena = outcomes[-1]
     errors = np.abs(arena.errors[PROPOSED])
@@ -96,10 +96,10 @@ def table_1(outcomes: Sequence[Outcome]) -> Sheet:
         (f"proposed, ours, {title}", *(spread_cm(each(values, axis=1)) for each in (np.mean, np.min, np.max)))
         for title, values in measures.items()
     ]
-    return Sheet("Table I: error in the arena, cm", ("", "mean", "min", "max"), (*published, *ours))
+    return Table("Table I: error in the arena, cm", ("", "mean", "min", "max"), (*published, *ours))
 
 
-def estimators(outcomes: Sequence[Outcome]) -> Sheet:
+def estimators(outcomes: Sequence[Outcome]) -> Table:
     """Every estimator on the same runs, the best first."""
     rows = [
         (
@@ -115,7 +115,7 @@ def estimators(outcomes: Sequence[Outcome]) -> Sheet:
     bound = ("Cramér-Rao bound of a fix", *(text for outcome in outcomes for text in ("–", cm(bound_rms_m(outcome)))))
     head = ("", *(text for o in outcomes for text in (f"{o.environment.short}\nlargest, cm", "RMSE, cm")))
     title = "Every estimator on the same runs: largest coordinate error, and Euclidean RMSE over points and seeds"
-    return Sheet(title, head, (*rows, bound))
+    return Table(title, head, (*rows, bound))
 
 
 def by_median(outcomes: Sequence[Outcome]) -> list[str]:
@@ -140,27 +140,27 @@ RECORDED_STD_DB = 4.45
 """Of one reading, in the public recordings of a robot among Wi-Fi anchors that `fusion import cdoa` reads, pooled."""
 
 
-def bounds(outcomes: Sequence[Outcome]) -> Sheet:
-    """What is physically possible for a radio fix."""
+def bounds(outcomes: Sequence[Outcome]) -> Table:
+    """The physical limit of a radio fix."""
     rows = []
     for outcome in outcomes:
-        told_db = outcome.scenario.world.anchors[0].radio.std
+        stated_db = outcome.scenario.world.anchors[0].radio.std
         limit_m, fix_m = bound_rms_m(outcome), _rmse(outcome, WIFI)
         rows.append(
             (
                 outcome.environment.title,
-                f"{told_db:.2f}",
+                f"{stated_db:.2f}",
                 cm(limit_m),
                 cm(fix_m),
                 f"{limit_m / fix_m:.2f}",
-                cm(limit_m * RECORDED_STD_DB / told_db),
+                cm(limit_m * RECORDED_STD_DB / stated_db),
             )
         )
     head = ("", "σ, dB", "bound, cm", "Wi-Fi alone, cm", "efficiency", f"bound at {RECORDED_STD_DB:g} dB, cm")
-    return Sheet("Cramér-Rao bound of the radio fix, root mean square over the trial points", head, tuple(rows))
+    return Table("Cramér-Rao bound of the radio fix, root mean square over the trial points", head, tuple(rows))
 
 
-def alternatives(outcomes: Sequence[Outcome]) -> Sheet:
+def alternatives(outcomes: Sequence[Outcome]) -> Table:
     """The paper's three curves in every filling, and how often the proposed one is the best."""
     rows = []
     for filling in (MAIN, *ALTERNATIVES):
@@ -176,10 +176,10 @@ def alternatives(outcomes: Sequence[Outcome]) -> Sheet:
             )
     head = ("filling", "odometry", "Wi-Fi", *(f"% of\n{scale}" for scale in SCALES), EKF)
     title = (
-        "Other fillings: largest error, cm. Of the proposed method, read in four ways, and of the EKF: the median, and "
-        "how often it beats odometry and Wi-Fi"
+        "Other fillings: largest error, cm. Of the proposed method, interpreted in four ways, and of the EKF: the "
+        "median, and how often it beats odometry and Wi-Fi"
     )
-    return Sheet(title, head, tuple(rows))
+    return Table(title, head, tuple(rows))
 
 
 def beating(curves: Mapping[str, Floats], name: str) -> str:
@@ -192,35 +192,41 @@ def filling_curves(outcome: Outcome, key: str) -> Mapping[str, Floats]:
     if key != MAIN.key:
         return outcome.alternatives[key]
     own = {estimator: outcome.largest(estimator) for estimator in (ODOMETRY, WIFI, EKF)}
-    return own | {scale: outcome.readings[:, literal_of_scale(scale)] for scale in SCALES}
+    return own | {scale: outcome.interpretations[:, literal_of_scale(scale)] for scale in SCALES}
 
 
-def readings(ranked: Sequence[Ranked], outcomes: Sequence[Outcome], shown: int = 8) -> Sheet:
-    """The readings closest to the paper, the literal one wherever it stands, and the furthest."""
-    places = sorted({*range(shown), [r.reading for r in ranked].index(literal()), len(ranked) - 1})
+def interpretations(ranked: Sequence[Ranked], outcomes: Sequence[Outcome], shown: int = 8) -> Table:
+    """The interpretations closest to the paper, the literal one wherever it stands, and the furthest."""
+    places = sorted({*range(shown), [r.interpretation for r in ranked].index(literal()), len(ranked) - 1})
     rows = []
     for place in places:
         each = ranked[place]
-        name = f"{place + 1}. {each.reading}" + (" (the defaults)" if each.reading == literal() else "")
-        found = (f"{cm(m)} ({100 * b.value:.0f} %)" for m, b in zip(each.medians_m, each.beats_both, strict=True))
-        rows.append((name, f"{each.factor:.2f}", *found))
+        name = f"{place + 1}. {each.interpretation}" + (" (the defaults)" if each.interpretation == literal() else "")
+        cells = (f"{cm(m)} ({100 * b.value:.0f} %)" for m, b in zip(each.medians_m, each.beats_both, strict=True))
+        rows.append((name, f"{each.factor:.2f}", *cells))
     published = ("published", "1", *(cm(outcome.environment.proposed_max_m) for outcome in outcomes))
-    head = ("reading: outlier in percent ...", "off by factor", *(f"{o.environment.short}, cm" for o in outcomes))
-    title = f"{len(ranked)} readings of the algorithm: median largest error, and in brackets how often it beats both"
-    return Sheet(title, head, (published, *rows))
+    head = (
+        "interpretation: outlier in percent ...",
+        "off by factor",
+        *(f"{o.environment.short}, cm" for o in outcomes),
+    )
+    title = (
+        f"{len(ranked)} interpretations of the algorithm: median largest error, and in brackets how often it beats both"
+    )
+    return Table(title, head, (published, *rows))
 
 
-def effects(found: Sequence[Effect], outcomes: Sequence[Outcome]) -> Sheet:
-    """How much each open option matters."""
+def effects(by_option: Sequence[Effect], outcomes: Sequence[Outcome]) -> Table:
+    """Effect of each open option."""
     rows = []
-    for option, medians, ratio in found:
+    for option, medians, ratio in by_option:
         rows += [(f"{option} = {value}", *map(cm, row)) for value, row in medians.items()]
         rows.append((f"{option}: largest / smallest", *(f"{each:.2f}" for each in ratio)))
     head = ("median largest error, cm, geometric mean over all other options", *(o.environment.short for o in outcomes))
-    return Sheet("How much each open reading matters", head, tuple(rows))
+    return Table("Effect of each open option", head, tuple(rows))
 
 
-def origins(outcomes: Sequence[Outcome]) -> Sheet:
+def origins(outcomes: Sequence[Outcome]) -> Table:
     """The same runs with the map's origin elsewhere."""
     rows = [
         (
@@ -230,10 +236,10 @@ def origins(outcomes: Sequence[Outcome]) -> Sheet:
         for k, offset_m in enumerate(ORIGINS_M)
     ]
     head = ("origin", *(f"{outcome.environment.short}, cm" for outcome in outcomes))
-    return Sheet("The same runs with the origin moved: largest error of the proposed method", head, tuple(rows))
+    return Table("The same runs with the origin moved: largest error of the proposed method", head, tuple(rows))
 
 
-def origin_example(rows: Sequence[Moved]) -> Sheet:
+def origin_example(rows: Sequence[Moved]) -> Table:
     """The minimal example of the origin."""
     cells = tuple(
         (
@@ -247,12 +253,12 @@ def origin_example(rows: Sequence[Moved]) -> Sheet:
         for row in rows
     )
     head = ("origin moved by, m", "x odometry, m", "x Wi-Fi, m", "differs, %", "verdict", "answer in the room, m")
-    return Sheet("The percentage rule depends on where the origin is", head, cells)
+    return Table("The percentage rule depends on where the origin is", head, cells)
 
 
-def lock_out_example(legs: Sequence[Leg]) -> Sheet:
+def lock_out_example(legs: Sequence[Leg]) -> Table:
     """The minimal example of the lock-out, at some of its corners."""
     shown = [leg for leg in legs if leg.trial <= 6 or leg.trial == len(legs)]
     cells = tuple((f"{leg.trial}", cm(leg.proposed_m), f"{leg.refused_in_a_row}", cm(leg.repaired_m)) for leg in shown)
     head = ("trial", "proposed, cm", "exact fixes refused in a row", "repaired, cm")
-    return Sheet("Lock-out: one slip of 1 m on the third leg, exact odometry and exact fixes otherwise", head, cells)
+    return Table("Lock-out: one slip of 1 m on the third leg, exact odometry and exact fixes otherwise", head, cells)

@@ -1,4 +1,4 @@
-"""One run of one environment: what every one, every reading and every origin makes of it, as small arrays."""
+"""One run of one environment under every estimator, interpretation and origin, as small arrays."""
 
 from __future__ import annotations
 
@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 import fusion
 from benchmarks.metrics.estimate_track import Track
 from benchmarks.metrics.matching import match
-from benchmarks.paper.interpretations import MISSING_OPTION, MISSING_VALUES, ORIGINS_M, READINGS, SCALE_OPTION, SCALES
+from benchmarks.paper.interpretations import (
+    INTERPRETATIONS,
+    MISSING_OPTION,
+    MISSING_VALUES,
+    ORIGINS_M,
+    SCALE_OPTION,
+    SCALES,
+)
 from benchmarks.paper.published import EKF, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.straight_moves import measured_moves
 from benchmarks.paper.variants import leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
@@ -31,14 +38,14 @@ GYRO_ESTIMATORS = (ODOMETRY, PROPOSED, "bayes_weight", EKF)
 
 
 class Trial(NamedTuple):
-    """All results of one run [m]: errors (points, 2) by one, infinite without a valid answer; whether the proposed
-    method took a fix for an outlier, (points,); its largest error by reading, by what missing Wi-Fi counts, by origin;
-    straight moves as its odometry measures them; why a one crashed, by one.
+    """All results of one run [m]: errors (points, 2) by estimator, infinite without a valid answer; whether the
+    proposed method took a fix for an outlier, (points,); its largest error by interpretation, by the count of missing
+    Wi-Fi, by origin; straight moves as its odometry measures them; the error of each estimator that crashed.
     """
 
     errors: Mapping[str, Floats]
     refused: NDArray[np.bool_]
-    readings: Floats
+    interpretations: Floats
     missing: Floats
     origins: Floats
     moves: Floats
@@ -57,11 +64,6 @@ def point_errors(run: Run, track: Track) -> Floats:
     answers = match(instants, track)
     away = np.stack([answers.x - instants.x, answers.y - instants.y], axis=1)
     return np.where(answers.valid[:, None], away, np.inf)
-
-
-def track_errors(run: Run, one: EstimatorRun) -> Floats:
-    """`point_errors` of a one; one that crashed gave no answer at all."""
-    return point_errors(run, one.track)
 
 
 @lru_cache(maxsize=8)
@@ -85,9 +87,9 @@ def run_trial(task: tuple[str | Path, int], estimators: Sequence[str] | None = N
     made |= {name + GYRO: (aided, run_estimator(aided, name, seed=seed)) for name in GYRO_ESTIMATORS}
     brief = leg_by_leg(plain)
     return Trial(
-        {name: track_errors(*one) for name, one in made.items()},
+        {name: point_errors(run, one.track) for name, (run, one) in made.items()},
         _refused(made[PROPOSED][1]),
-        np.array([proposed_largest(brief, reading.options) for reading in READINGS]),
+        np.array([proposed_largest(brief, each.options) for each in INTERPRETATIONS]),
         np.array([proposed_largest(missing_wifi(brief, seed), {MISSING_OPTION: value}) for value in MISSING_VALUES]),
         np.array([proposed_largest(moved_by(brief, offset_m)) for offset_m in ORIGINS_M]),
         measured_moves(scenario, seed),
@@ -100,13 +102,14 @@ def run_alternative(task: tuple[Scenario, int]) -> Mapping[str, float]:
     scenario, seed = task
     brief = leg_by_leg(without_gyro(simulated_run(scenario, seed)))
     alone = {
-        name: largest(track_errors(brief, run_estimator(brief, name, seed=seed))) for name in (ODOMETRY, WIFI, EKF)
+        name: largest(point_errors(brief, run_estimator(brief, name, seed=seed).track))
+        for name in (ODOMETRY, WIFI, EKF)
     }
     return alone | {scale: proposed_largest(brief, {SCALE_OPTION: scale}) for scale in SCALES}
 
 
 def proposed_largest(run: Run, options: Mapping[str, object] | None = None) -> float:
-    """The largest error [m] of the proposed method, read as ``options`` say."""
+    """The largest error [m] of the proposed method, interpreted by ``options``."""
     assert run.prior is not None
     estimator = fusion.load(PROPOSED)(run.world, **(options or {}))
     updates = list(fusion.track(estimator, run.world, run.measurements, run.prior))

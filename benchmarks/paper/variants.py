@@ -1,4 +1,4 @@
-"""One run told in other ways: with its gyro, leg by leg, with another origin, with scans that miss an access point."""
+"""One run in other forms: with its gyro, leg by leg, with another origin, with scans that miss an access point."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from logs.run import Run
 from sensors.simulation.scenario import Reality
 
 MISSING_SHARE = 0.2
-"""How often a scan lacks one access point, in the variant with missing Wi-Fi."""
+"""Share of scans that lack one access point, in the variant with missing Wi-Fi."""
 
 
 def without_gyro(run: Run) -> Run:
@@ -25,7 +25,7 @@ def without_gyro(run: Run) -> Run:
 
 
 def with_gyro(run: Run, reality: Reality) -> Run:
-    """The run of a robot that takes its turns from the gyro, and is told how good that is."""
+    """The run of a robot that takes its turns from the gyro, and knows how good that is."""
     table: dict[str, Any] = json.loads(run.world.table)
     table["robot"]["turn_source"] = "gyro"
     table["robot"]["noise"] |= {

@@ -22,7 +22,7 @@ LONGEST_LINE = 2000
 
 
 LEAST_CM = 1.0
-"""Where logarithmic axes of errors begin, unless all are small: a run starts where it is told to, with no error."""
+"""Lower end of logarithmic axes of errors, unless all are small: a run starts at its prior, with no error."""
 
 
 LEADING = 200
@@ -36,7 +36,7 @@ def accuracy(data: ReportData) -> Iterator[Panel]:
 
 
 def _cdf(data: ReportData) -> Panel:
-    """How often the error is below a distance; a curve ends at the availability, not at one."""
+    """Distribution of errors; a curve ends at the availability, not at one."""
     panel = Panel("Error distribution, without faults", "position error, cm, log scale", "share of instants, %")
     for name in data.estimators:
         _distribution(panel, data, name)
@@ -63,8 +63,8 @@ def _distribution(panel: Panel, data: ReportData, name: str) -> None:
     for place, series in enumerate(own):
         at = few[cell[order[few]] == place]
         result = series.result
-        said = f"{name}, {result.cell.run.id}"
-        panel.lead(error_cm[at], share[at], data.anchor(result), said, time_s[order[at]])
+        caption = f"{name}, {result.cell.run.id}"
+        panel.lead(error_cm[at], share[at], data.anchor(result), caption, time_s[order[at]])
 
 
 def _paired(data: ReportData) -> Panel:
@@ -80,9 +80,9 @@ def _paired(data: ReportData) -> Panel:
         colour = plain_colour(data.use(name))
         panel.axes.scatter(scores[known, place], np.full(known.sum(), place), color=colour, s=24, zorder=2)
         for score, (run_id, cells) in zip(medians[place], by_run(grouped[name]).items(), strict=True):
-            said = f"{name}, {run_id}: {data.metric} {data.text(score)}"
+            caption = f"{name}, {run_id}: {data.metric} {data.text(score)}"
             result = nearest(cells, data.metric, score)
-            panel.lead(data.unit.factor * score, place, data.anchor(result), said)
+            panel.lead(data.unit.factor * score, place, data.anchor(result), caption)
     panel.rows(names)
     panel.log("x")
     return panel
@@ -97,8 +97,8 @@ def over_time(data: ReportData) -> Iterator[Panel]:
                 time_s, error_cm = series.time_s, 100.0 * np.where(series.answers.valid, series.error_m, np.nan)
                 few, fewer = peaks(error_cm, LONGEST_LINE), peaks(error_cm, LEADING)
                 panel.axes.plot(time_s[few], error_cm[few], linewidth=1, **_style(data, name))
-                anchor, said = data.anchor(series.result), f"{name}, {run_id}"
-                panel.lead(time_s[fewer], error_cm[fewer], anchor, said, time_s[fewer])
+                anchor, caption = data.anchor(series.result), f"{name}, {run_id}"
+                panel.lead(time_s[fewer], error_cm[fewer], anchor, caption, time_s[fewer])
         panel.log("y")
         panel.axes.set_ylim(bottom=_beginning(*panel.axes.get_ylim()))
         if place == 0:
@@ -116,8 +116,8 @@ def cost(data: ReportData) -> Iterator[Panel]:
             place = (data.timing[name], data.unit.factor * score)
             panel.axes.scatter(*place, color=plain_colour(data.use(name)), s=30, label=f"{rank} {name}")
             panel.axes.annotate(str(rank), place, textcoords="offset points", xytext=(4, 3), fontsize=8)
-            said = f"{name}: {data.metric} {data.text(score)}, {place[0]:.0f} µs"
-            panel.lead(*place, data.anchor(nearest(grouped[name], data.metric, score)), said)
+            caption = f"{name}: {data.metric} {data.text(score)}, {place[0]:.0f} µs"
+            panel.lead(*place, data.anchor(nearest(grouped[name], data.metric, score)), caption)
     panel.log("x")
     panel.log("y")
     if panel.axes.collections:
@@ -126,7 +126,7 @@ def cost(data: ReportData) -> Iterator[Panel]:
 
 
 def _beginning(low: float, high: float) -> float:
-    """Where an axis of errors begins that would reach from ``low`` to ``high`` [cm].
+    """Lower end of an axis of errors that would reach from ``low`` to ``high`` [cm].
 
     >>> _beginning(1e-7, 300.0), _beginning(20.0, 300.0), _beginning(1e-7, 0.5)
     (1.0, 20.0, 0.005)
@@ -135,6 +135,6 @@ def _beginning(low: float, high: float) -> float:
 
 
 def _style(data: ReportData, name: str) -> dict[str, Any]:
-    """The colour of the estimator, and a line that tells its neighbours from it without colour."""
+    """The colour of the estimator, and a line that distinguishes it from its neighbours without colour."""
     line = LINES[data.estimators.index(name) % len(LINES)]
     return {"color": plain_colour(data.use(name)), "linestyle": line, "label": name}

@@ -34,7 +34,7 @@ addEventListener("hashchange", reveal);
 reveal();
 """
 """Buttons that mark a command and copy it (the clipboard proper may be refused to a page from a file), and the
-unfolding of what a link leads to, for browsers that do not do it. Without it the page says the same.
+unfolding of what a link leads to, for browsers that do not do it. Without it the page shows the same.
 """
 
 
@@ -87,10 +87,10 @@ def _entry(data: ReportData, result: Result) -> str:
     where = [cell.run.id + (" (tune)" if cell.run.split == TUNE else "")]
     where += [] if cell.fault.id == CLEAN else [cell.fault.id]
     where += [f"seed {cell.seed}"] if data.suite.seeds > 1 else []
-    said = [result.status]
+    facts = [result.status]
     if data.metric in result.metrics:
-        said.append(f"{data.metric} {data.text(result.metrics[data.metric])}")
+        facts.append(f"{data.metric} {data.text(result.metrics[data.metric])}")
     if result.worst_at_s is not None:
-        said.append(f"worst error {100.0 * result.metrics['pos_max']:.0f} cm at {result.worst_at_s:.1f} s")
-    told = html.escape(f"{', '.join(where)}: {', '.join(said)}")
-    return f'<li id="{data.anchor(result)}">{told}<br><code>{html.escape(command(result, data.words))}</code></li>'
+        facts.append(f"worst error {100.0 * result.metrics['pos_max']:.0f} cm at {result.worst_at_s:.1f} s")
+    title = html.escape(f"{', '.join(where)}: {', '.join(facts)}")
+    return f'<li id="{data.anchor(result)}">{title}<br><code>{html.escape(command(result, data.words))}</code></li>'

@@ -1,4 +1,4 @@
-"""Whether estimators are as far off as they claim: NEES of their answers, NIS of the readings they expected.
+"""Consistency of estimators: NEES of their answers, NIS of the readings they expected.
 
 Every mean has its own band, which counts how many independent samples it is of.
 """
@@ -29,8 +29,8 @@ def consistency(data: ReportData) -> Iterator[Panel]:
     nees = {name: [_nees(result) for result in cells[name]] for name in data.estimators}
     yield from _drawn(data, "ANEES", "Answers: ANEES", nees)
     for sensor in NAMES:
-        found = {name: list(_nis(data, nis, name, sensor)) for name in data.estimators}
-        yield from _drawn(data, f"mean NIS of {sensor}", f"Readings of {sensor}: mean NIS", found)
+        judged = {name: list(_nis(data, nis, name, sensor)) for name in data.estimators}
+        yield from _drawn(data, f"mean NIS of {sensor}", f"Readings of {sensor}: mean NIS", judged)
 
 
 def _nees(result: Result) -> Judged:
@@ -38,16 +38,16 @@ def _nees(result: Result) -> Judged:
 
 
 def _nis(
-    data: ReportData, found: Mapping[tuple[str, str], Mapping[str, Banded]], name: str, sensor: str
+    data: ReportData, nis: Mapping[tuple[str, str], Mapping[str, Banded]], name: str, sensor: str
 ) -> Iterator[Judged]:
-    for (run_id, own), told in found.items():
-        if own == name and sensor in told:
-            yield data.series[run_id, own].result, told[sensor]
+    for (run_id, own), by_sensor in nis.items():
+        if own == name and sensor in by_sensor:
+            yield data.series[run_id, own].result, by_sensor[sensor]
 
 
-def _drawn(data: ReportData, what: str, title: str, found: Mapping[str, Sequence[Judged]]) -> Iterator[Panel]:
+def _drawn(data: ReportData, what: str, title: str, judged: Mapping[str, Sequence[Judged]]) -> Iterator[Panel]:
     """A row for each estimator that has any."""
-    known = {name: [one for one in own if np.isfinite(one[1].mean)] for name, own in found.items()}
+    known = {name: [one for one in own if np.isfinite(one[1].mean)] for name, own in judged.items()}
     shown = {name: own for name, own in known.items() if own}
     if not shown:
         return
@@ -57,15 +57,15 @@ def _drawn(data: ReportData, what: str, title: str, found: Mapping[str, Sequence
         places = row + np.linspace(-0.3, 0.3, len(own) + 2)[1:-1]
         _draw(panel, plain_colour(data.use(name)), places, [one for _, one in own])
         for place, (result, one) in zip(places, own, strict=True):
-            said = f"{name}, {result.cell.run.id}: {what} {one.mean:.2f} [{one.low:.2f}, {one.high:.2f}]"
-            panel.lead(one.mean, place, data.anchor(result), said)
+            caption = f"{name}, {result.cell.run.id}: {what} {one.mean:.2f} [{one.low:.2f}, {one.high:.2f}]"
+            panel.lead(one.mean, place, data.anchor(result), caption)
     panel.rows(list(shown))
     panel.log("x")
     yield panel
 
 
 def _draw(panel: Panel, colour: tuple[float, float, float], places: Floats, own: Sequence[Banded]) -> None:
-    """Dots inside their bands, crosses outside: told apart without colour."""
+    """Dots inside their bands, crosses outside: distinct without colour."""
     mean, low, high = np.array(own).T
     inside = np.array([one.is_inside for one in own])
     panel.axes.hlines(places, low, high, color="0.8", linewidth=3, zorder=1)

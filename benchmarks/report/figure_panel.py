@@ -1,4 +1,4 @@
-"""One picture of a report, and where what is drawn in it leads: to a cell, and where it is a moment to that."""
+"""One picture of a report, whose points lead to cells, and where they are moments to these."""
 
 from __future__ import annotations
 
@@ -16,19 +16,15 @@ from fusion.output.figures import as_png, label, panels, plain_ticks
 from fusion.output.html import inline_png
 
 FINE = 1e4
-"""Into how many parts width and height of a picture are divided, to say where something is."""
+"""Parts of the width and the height of a picture, in which places are counted."""
 
 LEFT_INCHES, RIGHT_INCHES, BOTTOM_INCHES, TOP_INCHES = 0.75, 0.2, 0.55, 0.3
 ROW_INCHES, LINE_INCHES = 0.45, 0.17
 LONG_NAME = 26
 """Letters of which two fit side by side into a legend no more."""
 
-DIGITS = (
-    (0.6, (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)),
-    (2.0, (1.0, 2.0, 5.0)),
-    (np.inf, (1.0,)),
-)
-"""Up to how many decades along x which numbers are written: as many as have room side by side."""
+DIGITS = ((0.6, (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)), (2.0, (1.0, 2.0, 5.0)), (np.inf, (1.0,)))
+"""Digits of the ticks for so many decades along x: as many as have room side by side."""
 
 POINTING = """
 function pointAt(figure, targets) {
@@ -37,47 +33,47 @@ function pointAt(figure, targets) {
   const nearest = (event) => {
     const box = figure.firstElementChild.getBoundingClientRect();
     let best = { away: 24 };
-    for (const [cell, said, xs, ys, times] of targets) {
+    for (const [cell, caption, xs, ys, times] of targets) {
       for (let k = 0; k < xs.length; k++) {
         const x = box.width * xs[k] / 1e4, y = box.height * ys[k] / 1e4;
         const away = Math.hypot(box.left + x - event.clientX, box.top + y - event.clientY);
-        if (away < best.away) best = { away, x, y, cell, said, at: times && times[k].toFixed(2) };
+        if (away < best.away) best = { away, x, y, cell, caption, at: times && times[k].toFixed(2) };
       }
     }
     return best;
   };
-  const show = ({ x, y, said, at }) => {
-    ring.style.cssText = said ? `left: ${x}px; top: ${y}px` : "display: none";
-    hint.textContent = said ? said + (at ? `, at ${at} s` : "") : "";
-    figure.style.cursor = said ? "pointer" : "";
+  const show = ({ x, y, caption, at }) => {
+    ring.style.cssText = caption ? `left: ${x}px; top: ${y}px` : "display: none";
+    hint.textContent = caption ? caption + (at ? `, at ${at} s` : "") : "";
+    figure.style.cursor = caption ? "pointer" : "";
   };
   show({});
   figure.onpointermove = (event) => show(nearest(event));
   figure.onpointerleave = () => show({});
   figure.firstElementChild.onclick = (event) => {
-    const found = nearest(event);
-    show(found);
-    if (!found.cell) return;
-    if (found.at) tellMoment(document.getElementById(found.cell), found.at);
-    if (location.hash === "#" + found.cell) reveal();
-    location.hash = found.cell;
+    const target = nearest(event);
+    show(target);
+    if (!target.cell) return;
+    if (target.at) showMoment(document.getElementById(target.cell), target.at);
+    if (location.hash === "#" + target.cell) reveal();
+    location.hash = target.cell;
   };
 }
-function tellMoment(entry, at) {
+function showMoment(entry, at) {
   const command = entry.querySelector("code");
-  let told = entry.querySelector(".moment");
-  if (!told) {
-    told = entry.appendChild(document.createElement("div"));
-    told.className = "moment";
-    told.append(document.createElement("span"), document.createElement("code"));
-    offerCopy(told.lastChild);
+  let moment = entry.querySelector(".moment");
+  if (!moment) {
+    moment = entry.appendChild(document.createElement("div"));
+    moment.className = "moment";
+    moment.append(document.createElement("span"), document.createElement("code"));
+    offerCopy(moment.lastChild);
   }
-  told.firstChild.textContent = `what was clicked, at ${at} s: `;
-  told.lastChild.textContent = command.textContent.replace(/--at [0-9.]+/, `--at ${at}`);
+  moment.firstChild.textContent = `what was clicked, at ${at} s: `;
+  moment.lastChild.textContent = command.textContent.replace(/--at [0-9.]+/, `--at ${at}`);
 }
 for (const figure of document.querySelectorAll("[data-targets]")) pointAt(figure, JSON.parse(figure.dataset.targets));
 """
-"""What is nearest to the pointer is ringed, named below the picture, and opened by a click. It needs `reveal` and
+"""The target nearest to the pointer is ringed, named below the picture, and opened by a click. It needs `reveal` and
 `offerCopy` of the page's own script. Without it, or without a pointer, the tables lead to the same cells.
 """
 
@@ -93,19 +89,19 @@ def without_targets(text: str) -> str:
 
 
 class Target(NamedTuple):
-    """What lies at ``x``, ``y`` in the units of the axes, and leads to ``anchor``; ``at_s``: where each point is a
-    moment, since the start of the run.
+    """Points at ``x``, ``y`` in the units of the axes that lead to ``anchor``; ``at_s``: where each point is a moment,
+    since the start of the run.
     """
 
     x: Floats
     y: Floats
     anchor: str
-    said: str
+    caption: str
     at_s: Floats | None
 
 
 class Panel:
-    """Axes with a title, of a height in inches; what is drawn on them leads to where `lead` says. ``fits``: whether all
+    """Axes with a title, of a height in inches, whose points lead to the anchors given to `lead`. ``fits``: whether all
     that stands around the axes is their own labels, so that nobody has to measure it: that takes half of the time.
     """
 
@@ -125,10 +121,10 @@ class Panel:
         ends = {"left": left / width, "right": 1.0 - RIGHT_INCHES / width}
         self.figure.subplots_adjust(**ends, bottom=(BOTTOM_INCHES + below) / height, top=1.0 - TOP_INCHES / height)
 
-    def lead(self, x: Floats | float, y: Floats | float, anchor: str, said: str, at_s: Floats | None = None) -> None:
+    def lead(self, x: Floats | float, y: Floats | float, anchor: str, caption: str, at_s: Floats | None = None) -> None:
         """Let points lead to an entry of the page; one point may be two numbers."""
         across, up = np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(y))
-        self._targets.append(Target(across.astype(np.float64), up.astype(np.float64), anchor, said, at_s))
+        self._targets.append(Target(across.astype(np.float64), up.astype(np.float64), anchor, caption, at_s))
 
     def log(self, which: Literal["x", "y"]) -> None:
         """A logarithmic axis, where anything is on it: where every estimator was lost, nothing is."""
@@ -175,8 +171,8 @@ class Panel:
         """The picture as a line of HTML, with its targets."""
         image = f'<img alt="{html.escape(self.title)}" src="{inline_png(as_png(self.figure))}">'
         # Only now that all is drawn is known where.
-        found = [shown for target in self._targets if (shown := self._shown(target))]
-        targets = html.escape(json.dumps(found, separators=(",", ":")))
+        visible = [shown for target in self._targets if (shown := self._shown(target))]
+        targets = html.escape(json.dumps(visible, separators=(",", ":")))
         return f'<div class="figure" data-targets="{targets}">{image}</div>'
 
     def _shown(self, target: Target) -> Sequence[object] | None:
@@ -188,7 +184,7 @@ class Panel:
             return None
         across, up = np.round(FINE * places[inside]).astype(int).T
         times = [] if target.at_s is None else [np.round(target.at_s[inside], 2).tolist()]
-        return [target.anchor, target.said, across.tolist(), (int(FINE) - up).tolist(), *times]
+        return [target.anchor, target.caption, across.tolist(), (int(FINE) - up).tolist(), *times]
 
 
 def group(every: Iterable[Panel]) -> str:
@@ -197,7 +193,7 @@ def group(every: Iterable[Panel]) -> str:
 
 
 def peaks(values: Floats, most: int) -> NDArray[np.intp]:
-    """Where the greatest value of each of at most ``most`` stretches is: thinned so, a curve keeps its peaks.
+    """Indices of the greatest value of each of at most ``most`` stretches: thinned so, a curve keeps its peaks.
 
     >>> peaks(np.array([1.0, 5.0, 2.0, np.nan, 0.0]), 3)
     array([1, 2, 4])

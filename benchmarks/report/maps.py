@@ -1,4 +1,4 @@
-"""Where the best estimator errs: its track over the floor, coloured by its error."""
+"""Maps of the best estimator: its track over the floor, coloured by its error."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _floor(panel: Panel, run: Run) -> None:
 
 
 def _bound(panel: Panel, run: Run) -> None:
-    """What the best unbiased fix from one reading of each anchor errs, as contours [m]."""
+    """Error of the best unbiased fix from one reading of each anchor, as contours [m]."""
     readings, grid = Readings(radio_of(run)), Grid.over(run.world.bounds, default_step(run.world.bounds))
     if len(run.world.anchors) < 2:
         return
@@ -70,6 +70,6 @@ def _track(panel: Panel, series: Series) -> None:
 def _lead(panel: Panel, data: ReportData, series: Series) -> None:
     valid, cell = np.flatnonzero(series.answers.valid), series.result.cell
     few = valid[peaks(series.error_m[valid], LEADING)]
-    said = f"{cell.estimator.id}, {cell.run.id}"
+    caption = f"{cell.estimator.id}, {cell.run.id}"
     where = series.answers.x[few], series.answers.y[few]
-    panel.lead(*where, data.anchor(series.result), said, series.time_s[few])
+    panel.lead(*where, data.anchor(series.result), caption, series.time_s[few])

@@ -1,4 +1,4 @@
-"""Who beats whom, and in which run: each number leads to the cell it comes from."""
+"""Verdicts on pairs, and scores run by run: each number leads to the cell it comes from."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from benchmarks.runner.leaderboard import pair_table
 from benchmarks.runner.results import Result, by_estimator, by_run, score_matrix
 from benchmarks.statistics.paired_tests import log_ratios
 from benchmarks.statistics.verdict import Comparison, Verdict
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 
 
-def run_by_run(data: ReportData) -> Sheet:
-    """What every estimator scored in every run: what the verdicts are made of."""
+def run_by_run(data: ReportData) -> Table:
+    """Scores of every estimator in every run, which the verdicts rest on."""
     grouped = by_estimator(data.results)
     rows = []
     for run_id in by_run(grouped[data.estimators[0]]):
         cells = [by_run(grouped[name])[run_id] for name in data.estimators]
         scores = [float(np.median(score_matrix(own, data.metric))) for own in cells]
-        told = [
+        linked = [
             link(data, data.unit.number(score), nearest(own, data.metric, score))
             for own, score in zip(cells, scores, strict=True)
         ]
-        rows.append((run_id, *told))
+        rows.append((run_id, *linked))
     over = ", median over seeds" if data.suite.seeds > 1 else ""
     unit = f" [{data.unit.name}]" if data.unit.name else ""
     title = f"Run by run: {data.metric}{unit} without faults{over}"
-    return Sheet(title, ("run", *data.estimators), tuple(rows))
+    return Table(title, ("run", *data.estimators), tuple(rows))
 
 
-def pairs(data: ReportData, comparison: Comparison) -> Sheet:
+def pairs(data: ReportData, comparison: Comparison) -> Table:
     """Every pair as one row; the ratio leads to the cell that decided most."""
     table = pair_table(comparison)
     rows = [

@@ -25,7 +25,7 @@ from benchmarks.runner.suite import CLEAN, TUNE
 from benchmarks.statistics.block_bootstrap import LEAST_INSTANTS, within_run
 from fusion.output.figures import require_matplotlib
 from fusion.output.html import as_html
-from fusion.output.tables import Sheet, as_code, as_markdown
+from fusion.output.tables import Table, as_code, as_markdown
 
 WITHIN_RUN = ("pos_p75", 0.75)
 """The quantile that is compared within one run; its instants have no other score."""
@@ -57,7 +57,7 @@ def report(data: ReportData, *, limit: bool = False) -> str:
 
 
 def _about_runs(data: ReportData) -> Iterator[str]:
-    """What is wrong with runs, and which do not count, and why."""
+    """Warnings of runs, and those that do not count, with the reason."""
     yield from (f"**Warning**: {as_code(warning)}" for warning in warnings(data.results))
     if blind := sorted({result.cell.run.id for result in data.results if not result.cell.content.truth}):
         yield f"Without ground truth, and so without an error: {', '.join(blind)}."
@@ -89,16 +89,16 @@ def _verdicts(data: ReportData) -> Iterator[str]:
         yield "Nothing can be compared here: give at least two estimators, and runs with truth."
         return
     best = data.estimators[0]
-    told = [
+    sentences = [
         f"{verdict.sentence} ([where](#{data.anchor(deciding(data, verdict))}))"
         for verdict in data.comparison.verdicts
         if best in (verdict.first, verdict.second)
     ]
-    yield "\n".join(f"- {sentence}" for sentence in told + _within_the_run(data))
+    yield "\n".join(f"- {sentence}" for sentence in sentences + _within_the_run(data))
 
 
 def _within_the_run(data: ReportData) -> list[str]:
-    """Where one run is all there is: what it says of itself, of the best against every other."""
+    """Sentences within a single run, where that is all there is: of the best against every other."""
     if len(data.scored_runs) != 1:
         return []
     errors = {name: series.error_m for (_, name), series in data.series.items()}
@@ -109,7 +109,7 @@ def _within_the_run(data: ReportData) -> list[str]:
 
 
 def _sections(data: ReportData, *, limit: bool) -> Iterator[str]:
-    """Who is better, how honest all are, where and when they err, what it costs, and what breaks them."""
+    """Verdicts, consistency, errors over time and floor, cost, and faults."""
     yield _table(tables.leaderboard(data), "leaderboard")
     if data.comparison is not None:
         yield _table(pairs(data, data.comparison), "pairs")
@@ -137,15 +137,15 @@ def _under_faults(data: ReportData) -> Iterator[str]:
         yield _table(tables.credibility(data), "credibility")
 
 
-def _table(sheet: Sheet, name: str = "") -> str:
+def _table(table: Table, name: str = "") -> str:
     """A table with what there is to know of it."""
-    return as_markdown(sheet) + (f"\n\n{NOTES[name]}" if name else "")
+    return as_markdown(table) + (f"\n\n{NOTES[name]}" if name else "")
 
 
-def _known(sheet: Sheet, name: str = "") -> Iterator[str]:
+def _known(table: Table, name: str = "") -> Iterator[str]:
     """The same, where it has rows."""
-    if sheet.rows:
-        yield _table(sheet, name)
+    if table.rows:
+        yield _table(table, name)
 
 
 def _figure(data: ReportData, name: str) -> Iterator[str]:
@@ -156,11 +156,11 @@ def _figure(data: ReportData, name: str) -> Iterator[str]:
 
 def _sensitivity(data: ReportData) -> Iterator[str]:
     """Nothing without a grid, or where nothing was scored."""
-    found = sweeps(data) if data.has_errors else []
-    if found:
-        yield as_markdown(sensitivity(data, found))
-        yield "\n".join(f"- {sentence}" for sentence in advice(found))
-        yield f"{group(curves(data, found))}\n\n{NOTES['parameters']}"
+    swept = sweeps(data) if data.has_errors else []
+    if swept:
+        yield as_markdown(sensitivity(data, swept))
+        yield "\n".join(f"- {sentence}" for sentence in advice(swept))
+        yield f"{group(curves(data, swept))}\n\n{NOTES['parameters']}"
 
 
 def _provenance(data: ReportData) -> Iterator[str]:
@@ -178,18 +178,18 @@ def _provenance(data: ReportData) -> Iterator[str]:
 
 NOTES: Mapping[str, str] = {
     "leaderboard": (
-        "Estimators that share a letter under `alike` cannot be told apart. Over runs: geometric mean with its 95 % t "
-        "interval. Worst run: the highest score of all. All other numbers are medians over cells. p75: three quarters "
-        "of the instants err less. Quantiles count every instant; RMSE, mean and max only those with a valid answer, "
-        "so read them with the availability, the share of such instants; heading errors only those whose true heading "
-        "is known (`head_n` of the exported numbers)."
+        "Estimators that share a letter under `alike` cannot be distinguished. Over runs: geometric mean with its 95 % "
+        "t interval. Worst run: the highest score of all. All other numbers are medians over cells. p75: three "
+        "quarters of the instants err less. Quantiles count every instant; RMSE, mean and max only those with a valid "
+        "answer, so read them with the availability, the share of such instants; heading errors only those whose true "
+        "heading is known (`head_n` of the exported numbers)."
     ),
     "pairs": (
         "Ratio of the first to the second: geometric mean over runs with its 95 % t interval, below 1 where the first "
         "is better. `p, Holm` decides, at 5 %; it is the p of that mean, or of the signed ranks where one of the two "
         "was lost in a run, corrected for the number of pairs. Intervals and `p, signed ranks` are of each pair alone. "
-        "The runs that a verdict says are needed, and the differences that it says so many runs show, are those that "
-        "four of five such suites would find."
+        "The runs that a verdict needs, and the differences that so many runs show, are those that four of five such "
+        "suites would find."
     ),
     "innovations": (
         "NIS: squared innovation of a reading over its predicted variance; refused readings count too. Inside 95 %: "

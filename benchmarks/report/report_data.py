@@ -1,4 +1,4 @@
-"""What a report is made of: the results of a suite, and for its figures the errors of the clean cells of one seed."""
+"""Data of a report: the results of a suite, and for its figures the errors of the clean cells of one seed."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from benchmarks.metrics.fates import FateColumns
 from benchmarks.metrics.matching import Answers, match
 from benchmarks.metrics.metric import Unit
 from benchmarks.runner.execute import stored_track
+from benchmarks.runner.reference import reference_of
 from benchmarks.runner.results import Result, by_estimator, comparison, judged, median_metrics
 from benchmarks.runner.run_source import open_run
 from benchmarks.runner.scoring import ALIVE
@@ -26,9 +27,8 @@ from fusion import ParameterError, Ranges
 from fusion.arrays import Floats
 from fusion.radio import RadioKind
 from fusion.values import NANOSECONDS
-from logs.prior import begin_ns
 from logs.run import Run
-from logs.truth import Instants, evaluation_instants
+from logs.truth import Instants
 
 SHOWN_RUNS = 6
 """Runs that get panels of their own."""
@@ -45,12 +45,12 @@ class Series(NamedTuple):
 
     @property
     def is_scored(self) -> bool:
-        """Whether the cell was not lost."""
+        """True where the cell was not lost."""
         return self.result.status in ALIVE
 
     @property
     def time_s(self) -> Floats:
-        """Of the instants since the start of the run: what `fusion review` calls ``--at``."""
+        """Of the instants since the start of the run: the ``--at`` of `fusion review`."""
         return (self.instants.time_ns - self.start_ns) / NANOSECONDS
 
     @property
@@ -61,7 +61,7 @@ class Series(NamedTuple):
 
 
 def radio_of(run: Run) -> RadioKind:
-    """What a fix of this run is made of: ranges, where it has any."""
+    """Kind of readings that a fix of this run is made of: ranges, where it has any."""
     return "range" if any(isinstance(measurement, Ranges) for measurement in run.measurements) else "rssi"
 
 
@@ -72,16 +72,15 @@ class ReportData:
         self.suite, self.results, self.metric = suite, list(results), metric
         self._store = store
         self._runs: dict[str, Run] = {}
-        self._starts_ns: dict[str, int] = {}
 
     @property
     def words(self) -> list[str]:
-        """What names suite and store on a command line."""
+        """Suite and store on a command line."""
         store = self._store.folder
         return [self.suite.word, *([] if store == STORE else ["--store", str(store.resolve())])]
 
     def anchor(self, result: Result) -> str:
-        """What links to the entry of a cell name."""
+        """Anchor of the entry of a cell."""
         return self._anchors[_ids(result)]
 
     def use(self, estimator: str) -> str:
@@ -89,7 +88,7 @@ class ReportData:
         return next(one.use for one in self.suite.estimators if one.id == estimator)
 
     def anchor_of_all(self, estimator: str) -> str:
-        """What links to all cells of an estimator name."""
+        """Anchor of all cells of an estimator."""
         return f"all-{self.estimators.index(estimator)}"
 
     @cached_property
@@ -98,16 +97,16 @@ class ReportData:
 
     @property
     def unit(self) -> Unit:
-        """Of what is compared."""
+        """Unit of the metric that is compared."""
         return unit_of(self.metric)
 
     @property
     def axis(self) -> str:
-        """What is compared, for an axis."""
+        """The metric that is compared, with its unit, for an axis."""
         return ", ".join(filter(None, (self.metric, self.unit.name)))
 
     def text(self, value: float) -> str:
-        """A value of what is compared, with its unit."""
+        """A value of that metric, with its unit."""
         return f"{self.unit.number(value)} {self.unit.name}".rstrip()
 
     @cached_property
@@ -139,18 +138,18 @@ class ReportData:
 
     @cached_property
     def has_errors(self) -> bool:
-        """Whether there is anything to draw: an estimator that answered, in a run with truth."""
+        """True where there is anything to draw: an estimator that answered, in a run with truth."""
         return any(result.worst_at_s is not None for result in judged(self.results))
 
     @cached_property
     def series(self) -> dict[tuple[str, str], Series]:
         """Clean cells of the first seed, by run and estimator, of the runs that are shown."""
-        found = {}
+        series = {}
         for result in self.results:
             cell = result.cell
             if cell.fault.id == CLEAN and cell.seed == 0 and cell.run.id in self.scored_runs:
-                found[cell.run.id, cell.estimator.id] = self._series(result)
-        return found
+                series[cell.run.id, cell.estimator.id] = self._series(result)
+        return series
 
     def seeds(self, estimator: str, fault: str) -> list[list[Errors]]:
         """Of each shown run the errors of its seeds under one fault; a crashed one answered nothing."""
@@ -170,19 +169,12 @@ class ReportData:
             self._runs[run_id] = open_run(self.suite.run(run_id), self.suite.folder)
         return self._runs[run_id]
 
-    def _start_ns(self, run_id: str) -> int:
-        if run_id not in self._starts_ns:
-            self._starts_ns[run_id] = begin_ns(self.run(run_id).measurements)
-        return self._starts_ns[run_id]
-
     def _series(self, result: Result) -> Series:
-        cell, rules = result.cell, result.cell.evaluation
-        truth = self.run(cell.run.id).truth
-        assert truth is not None
-        instants = evaluation_instants(truth, hz=rules.hz, gap_s=rules.gap_s)
+        cell = result.cell
+        _, instants, start_ns = reference_of(cell, self._store)
         track, fates = stored_track(cell, self._store)
-        answers = match(instants, track, max_age_s=rules.max_age_s)
-        return Series(result, self._start_ns(cell.run.id), instants, answers, fates)
+        answers = match(instants, track, max_age_s=cell.evaluation.max_age_s)
+        return Series(result, start_ns, instants, answers, fates)
 
 
 def _ids(result: Result) -> tuple[str, str, str, int]:

@@ -1,4 +1,4 @@
-"""How much the parameters matter that a suite has a grid of: each value against the default, run by run.
+"""Sensitivity to the parameters that a suite has a grid of: each value against the default, run by run.
 
 A value that is chosen on a run and scored on it flatters itself, so the runs for tuning and those for testing stand
 apart.
@@ -22,7 +22,7 @@ from benchmarks.runner.suite import CLEAN, TEST, TUNE, EstimatorSpec
 from benchmarks.statistics.paired_tests import log_ratios, mean_interval
 from fusion.arrays import Flags, Floats
 from fusion.output.figures import plain_colour, plain_ticks
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 from fusion.plugins import parameters
 
 WITHOUT_TUNE = (
@@ -65,8 +65,8 @@ class Sweep(NamedTuple):
     @property
     def intervals(self) -> tuple[Floats, Floats, Floats]:
         """Of every value the geometric mean over the judged runs, and the ends of its paired t interval."""
-        found = [mean_interval(row[np.isfinite(row)]) for row in self.log_ratios[:, self.judged]]
-        mean, low, high = (np.exp(np.clip([float(one[k]) for one in found], -50.0, 50.0)) for k in range(3))
+        intervals = [mean_interval(row[np.isfinite(row)]) for row in self.log_ratios[:, self.judged]]
+        mean, low, high = (np.exp(np.clip([float(one[k]) for one in intervals], -50.0, 50.0)) for k in range(3))
         return mean, low, high
 
     def name(self, place: int) -> str:
@@ -106,7 +106,7 @@ def _cells(data: ReportData, ids: Sequence[str]) -> list[list[Result]]:
     return list(by_run(own).values())
 
 
-def sensitivity(data: ReportData, found: Sequence[Sweep]) -> Sheet:
+def sensitivity(data: ReportData, swept: Sequence[Sweep]) -> Table:
     """Each value as a multiple of what it is compared with: geometric mean over runs with its paired t interval. It
     leads to the run in which the value makes the greatest difference.
     """
@@ -117,21 +117,21 @@ def sensitivity(data: ReportData, found: Sequence[Sweep]) -> Sheet:
             sweep.name(place),
             *(_linked(data, sweep, place, of) for of in (~sweep.is_test, sweep.is_test)),
         )
-        for sweep in found
+        for sweep in swept
         for place in range(len(sweep.values))
     ]
     title = f"Parameters: {data.metric} as a multiple of the default's (else of the first value's), [95 %]"
-    return Sheet(title, ("estimator", "parameter", "value", "tune runs", "test runs"), tuple(rows))
+    return Table(title, ("estimator", "parameter", "value", "tune runs", "test runs"), tuple(rows))
 
 
 def _linked(data: ReportData, sweep: Sweep, place: int, of: Flags) -> str:
-    text = _told(sweep, place, of)
+    text = _ratio_text(sweep, place, of)
     if text == "–":
         return text
     return link(data, text, _cell(data, sweep, place, _farthest(sweep, place, of)))
 
 
-def _told(sweep: Sweep, place: int, of: Flags) -> str:
+def _ratio_text(sweep: Sweep, place: int, of: Flags) -> str:
     ratios = sweep.log_ratios[place, of]
     known = ratios[np.isfinite(ratios)]
     if place == sweep.compared_with or len(known) == 0:
@@ -142,9 +142,9 @@ def _told(sweep: Sweep, place: int, of: Flags) -> str:
     return f"{mean:.2f}×{interval}{gone}"
 
 
-def advice(found: Sequence[Sweep]) -> Iterator[str]:
-    """What may be concluded: the best value of the tune runs, and what it is worth on the others."""
-    for sweep in found:
+def advice(swept: Sequence[Sweep]) -> Iterator[str]:
+    """Conclusions: the best value of the tune runs, and its score on the others."""
+    for sweep in swept:
         if sweep.is_test.all():
             yield WITHOUT_TUNE
             return
@@ -153,13 +153,13 @@ def advice(found: Sequence[Sweep]) -> Iterator[str]:
         if best == sweep.compared_with:
             yield f"{chosen}."
         else:
-            worth = _told(sweep, best, sweep.is_test)
+            worth = _ratio_text(sweep, best, sweep.is_test)
             yield f"{chosen}; on the {TEST} runs it scores {worth} what {sweep.name(sweep.compared_with)} does."
 
 
-def curves(data: ReportData, found: Sequence[Sweep]) -> Iterator[Panel]:
+def curves(data: ReportData, swept: Sequence[Sweep]) -> Iterator[Panel]:
     """One panel per parameter."""
-    for sweep in found:
+    for sweep in swept:
         title, y = f"{sweep.estimator}: {sweep.parameter}", f"ratio of {data.metric}, log scale"
         panel = Panel(title, "value; dotted: the default" if sweep.has_default else "value", y)
         _draw(panel, sweep)
@@ -194,8 +194,8 @@ def _lead(panel: Panel, data: ReportData, sweep: Sweep) -> None:
             cell = _cell(data, sweep, place, run)
             panel.lead(place, ratio, data.anchor(cell), f"{value}, {cell.cell.run.id}: {ratio:.2f}×")
         cell = _cell(data, sweep, place, _farthest(sweep, place, sweep.judged))
-        said = f"{value}: {_told(sweep, place, sweep.judged)}, farthest in {cell.cell.run.id}"
-        panel.lead(place, sweep.intervals[0][place], data.anchor(cell), said)
+        caption = f"{value}: {_ratio_text(sweep, place, sweep.judged)}, farthest in {cell.cell.run.id}"
+        panel.lead(place, sweep.intervals[0][place], data.anchor(cell), caption)
 
 
 def _farthest(sweep: Sweep, place: int, of: Flags) -> int:

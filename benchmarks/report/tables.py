@@ -21,7 +21,7 @@ from benchmarks.runner.scoring import ALIVE
 from benchmarks.runner.suite import CLEAN
 from benchmarks.statistics.paired_tests import mean_interval
 from fusion.arrays import Floats
-from fusion.output.tables import Sheet, as_code
+from fusion.output.tables import Table, as_code
 
 OUTAGE_COLUMNS = (
     column("fault_availability", "available inside", separator=", "),
@@ -31,8 +31,8 @@ OUTAGE_COLUMNS = (
 )
 
 
-def leaderboard(data: ReportData) -> Sheet:
-    """The best first, with the letters that say who cannot be told apart, and the worst run beside the median."""
+def leaderboard(data: ReportData) -> Table:
+    """The best first, with a letter for those that cannot be distinguished, and the worst run beside the median."""
     grouped, unit = by_estimator(data.results), data.unit
     letters = data.comparison.letters if data.comparison else {}
     rows = []
@@ -51,7 +51,7 @@ def leaderboard(data: ReportData) -> Sheet:
     titles = (one.title.replace("\n", " ") for one in COLUMNS)
     metric = f"{data.metric} {unit.name}".rstrip()
     titled = ("estimator", "alike", "cells ok", f"{metric} over runs [95 %]", f"worst run, {metric}", *titles)
-    return Sheet("Leaderboard: medians over cells without faults", titled, tuple(rows))
+    return Table("Leaderboard: medians over cells without faults", titled, tuple(rows))
 
 
 def _interval(scores: Floats, unit: Unit) -> str:
@@ -59,18 +59,18 @@ def _interval(scores: Floats, unit: Unit) -> str:
     alive = scores[np.isfinite(scores) & (scores > 0.0)]
     if len(alive) < 2:
         return "–"
-    found = mean_interval(np.log(alive))
-    mean, low, high = (unit.number(math.exp(min(float(value), 50.0))) for value in found[:3])
+    interval = mean_interval(np.log(alive))
+    mean, low, high = (unit.number(math.exp(min(float(value), 50.0))) for value in interval[:3])
     gone = f" ({len(scores) - len(alive)} lost)" if len(alive) < len(scores) else ""
     return f"{mean} [{low}, {high}]{gone}"
 
 
-def faults(data: ReportData) -> Sheet:
-    """How much worse each fault makes each estimator: the median over runs of faulty over clean."""
-    clean, struck = by_estimator(data.results), data.suite.faults[1:]
-    rows = [(name, *(_under(data, name, clean[name], fault.id) for fault in struck)) for name in data.estimators]
+def faults(data: ReportData) -> Table:
+    """Effect of each fault on each estimator: the median over runs of faulty over clean."""
+    clean, applied = by_estimator(data.results), data.suite.faults[1:]
+    rows = [(name, *(_under(data, name, clean[name], fault.id) for fault in applied)) for name in data.estimators]
     head = ("estimator", *(fault.id for fault in data.suite.faults if fault.id != CLEAN))
-    return Sheet(f"Faults: {data.metric} as a multiple of the clean run's, median over runs", head, tuple(rows))
+    return Table(f"Faults: {data.metric} as a multiple of the clean run's, median over runs", head, tuple(rows))
 
 
 def _under(data: ReportData, name: str, clean: Sequence[Result], fault: str) -> str:
@@ -85,8 +85,8 @@ def _under(data: ReportData, name: str, clean: Sequence[Result], fault: str) -> 
     return link(data, text, nearest(list(by_run(own).values())[row], data.metric, scores[row]))
 
 
-def outages(data: ReportData) -> Sheet:
-    """What each fault with windows did while it lasted, and how soon after that was over; no rows without such."""
+def outages(data: ReportData) -> Table:
+    """Errors while each fault with windows lasted, and the recovery after it; no rows without such."""
     rows, clean = [], by_estimator(data.results)
     for fault in data.suite.faults[1:]:
         grouped = by_estimator(data.results, fault.id)
@@ -96,15 +96,15 @@ def outages(data: ReportData) -> Sheet:
             if set(numbers) != {"–"}:
                 rows.append((fault.id, name, *numbers, _under(data, name, clean[name], fault.id)))
     head = ("fault", "estimator", *(one.title for one in OUTAGE_COLUMNS), f"{data.metric} over clean")
-    return Sheet("While a fault lasts: medians over cells, the worst of its windows", head, tuple(rows))
+    return Table("While a fault lasts: medians over cells, the worst of its windows", head, tuple(rows))
 
 
 def _times(ratio: float) -> str:
     return "∞" if not math.isfinite(ratio) else f"{ratio:.2f}×"
 
 
-def limits(data: ReportData) -> Sheet:
-    """How many times the posterior Cramér-Rao bound of the run each estimator errs, over the shown runs."""
+def limits(data: ReportData) -> Table:
+    """Ratio of each estimator's error to the posterior Cramér-Rao bound of the run, over the shown runs."""
     bounds = {run_id: posterior_bound(data.run(run_id)) for run_id in data.scored_runs}
     rows = []
     for name in data.estimators:
@@ -118,24 +118,24 @@ def limits(data: ReportData) -> Sheet:
             cells.append("–" if math.isnan(ratio) else link(data, f"{ratio:.2f}×", series.result))
         rows.append((name, *cells))
     title = "Times the physical limit: RMSE over the posterior Cramér-Rao bound of the run (0.89 is perfect in one run)"
-    return Sheet(title, ("estimator", *bounds), tuple(rows))
+    return Table(title, ("estimator", *bounds), tuple(rows))
 
 
-def fixes(data: ReportData) -> Sheet:
-    """What one perfect fix from a reading of every anchor would err, over what each estimator errs (`eff_crlb`)."""
+def fixes(data: ReportData) -> Table:
+    """Error of one perfect fix from a reading of every anchor over that of each estimator (`eff_crlb`)."""
     rows = []
     for name in data.estimators:
         series = [data.series.get((run_id, name)) for run_id in data.scored_runs]
-        found = [
+        ratios = [
             math.nan if one is None or not one.is_scored else eff_crlb(one.error_m, data.fix_bound_m(one))
             for one in series
         ]
-        rows.append((name, *("–" if math.isnan(ratio) else f"{100.0 * ratio:.0f} %" for ratio in found)))
+        rows.append((name, *("–" if math.isnan(ratio) else f"{100.0 * ratio:.0f} %" for ratio in ratios)))
     title = "One perfect fix: its Cramér-Rao bound over the RMSE (only motion or a prior brings more than 100 %)"
-    return Sheet(title, ("estimator", *data.scored_runs), tuple(rows))
+    return Table(title, ("estimator", *data.scored_runs), tuple(rows))
 
 
-def credibility(data: ReportData) -> Sheet:
+def credibility(data: ReportData) -> Table:
     """Claimed against actual errors over the seeds, under each set of faults.
 
     Without faults the seeds share every reading, and an error that all of them share would count as the actual one.
@@ -143,18 +143,18 @@ def credibility(data: ReportData) -> Sheet:
     faults = [fault.id for fault in data.suite.faults if fault.id != CLEAN]
     rows = []
     for name in data.estimators:
-        found = [credibility_metrics(data.seeds(name, fault)) for fault in faults]
-        rows.append((name, *(_decibels(scores) for scores in found)))
+        by_fault = [credibility_metrics(data.seeds(name, fault)) for fault in faults]
+        rows.append((name, *(_decibels(scores) for scores in by_fault)))
     title = "Credibility over the seeds: nci, and incl in brackets, dB (0 is credible, incl above 0 too certain)"
-    return Sheet(title, ("estimator", *faults), tuple(rows))
+    return Table(title, ("estimator", *faults), tuple(rows))
 
 
 def _decibels(scores: dict[str, float]) -> str:
     return "–" if math.isnan(scores["nci"]) else f"{scores['nci']:.1f} ({scores['incl']:+.1f})"
 
 
-def moments(data: ReportData) -> Sheet:
-    """Where to look first."""
+def moments(data: ReportData) -> Table:
+    """The worst moments, each with its command."""
     rows = tuple(
         (
             one.cell.run.id,
@@ -165,34 +165,34 @@ def moments(data: ReportData) -> Sheet:
         )
         for one in worst_moments(data.results)
     )
-    return Sheet("Worst moments", ("run", "estimator", "time, s", "error, cm", "command"), rows, prose=True)
+    return Table("Worst moments", ("run", "estimator", "time, s", "error, cm", "command"), rows, prose=True)
 
 
-def lost(data: ReportData) -> Sheet:
+def lost(data: ReportData) -> Table:
     """Every cell that did not survive, and why."""
     rows = tuple(
         (link(data, str(result.cell), result), result.status, as_code(result.error or result.status))
         for result in data.results
         if result.status not in ALIVE
     )
-    return Sheet("Lost cells", ("cell", "status", "why"), rows, prose=True)
+    return Table("Lost cells", ("cell", "status", "why"), rows, prose=True)
 
 
-def provenance(data: ReportData) -> Sheet:
-    """What every run and estimator of the suite is, down to the hash."""
+def provenance(data: ReportData) -> Table:
+    """Source and content hash of every run of the suite."""
     runs = [
         (run.id, run.mcap or f"{run.scenario}, seed {run.seed}", run.split, _content(data, run.id))
         for run in data.suite.runs
     ]
-    return Sheet("Runs", ("run", "source", "split", "content"), tuple(runs), prose=True)
+    return Table("Runs", ("run", "source", "split", "content"), tuple(runs), prose=True)
 
 
 def _content(data: ReportData, run_id: str) -> str:
     return next(result.cell.content.measured[:16] for result in data.results if result.cell.run.id == run_id)
 
 
-def estimators(data: ReportData) -> Sheet:
-    """What was run under each name, and on which runs its parameters were chosen."""
+def estimators(data: ReportData) -> Table:
+    """Estimator and parameters of each name, and the runs on which they were chosen."""
     rows = tuple(
         (
             one.id,
@@ -202,14 +202,14 @@ def estimators(data: ReportData) -> Sheet:
         )
         for one in data.suite.estimators
     )
-    return Sheet("Estimators", ("id", "estimator", "tuned on", "parameters"), rows, prose=True)
+    return Table("Estimators", ("id", "estimator", "tuned on", "parameters"), rows, prose=True)
 
 
-def damage(data: ReportData) -> Sheet:
-    """What each fault does, as the suite has it; no rows without any."""
+def damage(data: ReportData) -> Table:
+    """Definition of each fault, as the suite has it; no rows without any."""
     rows = tuple(
         (fault.id, "; ".join(", ".join(f"{key} = {value}" for key, value in one.items()) for one in fault.apply))
         for fault in data.suite.faults
         if fault.id != CLEAN
     )
-    return Sheet("Damage", ("fault", "what it does"), rows, prose=True)
+    return Table("Damage", ("fault", "what it does"), rows, prose=True)

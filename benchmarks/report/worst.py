@@ -14,8 +14,8 @@ from benchmarks.runner.suite import CLEAN
 
 
 def command(result: Result, suite: Sequence[str]) -> str:
-    """How to make the cell again and look at its worst moment; ``suite``: the words that name the suite and its store
-    on a command line.
+    """Command that makes the cell again and shows its worst moment; ``suite``: the words that name the suite and its
+    store on a command line.
     """
     cell = result.cell
     log = re.sub(r"[^\w.=-]+", "-", f"{cell.run.id}.{cell.estimator.id}.{cell.fault.id}.{cell.seed}") + ".mcap"
@@ -30,7 +30,7 @@ def command(result: Result, suite: Sequence[str]) -> str:
 def worst_moments(results: Sequence[Result], count: int = 10) -> list[Result]:
     """The cells without faults that hold the ``count`` worst, of the runs that count; of several seeds the worst."""
     clean = [one for one in judged(results) if one.cell.fault.id == CLEAN and one.worst_at_s is not None]
-    found: dict[tuple[str, str], Result] = {}
+    worst: dict[tuple[str, str], Result] = {}
     for one in sorted(clean, key=lambda one: -one.metrics.get("pos_max", np.nan)):
-        found.setdefault((one.cell.run.id, one.cell.estimator.id), one)
-    return list(found.values())[:count]
+        worst.setdefault((one.cell.run.id, one.cell.estimator.id), one)
+    return list(worst.values())[:count]

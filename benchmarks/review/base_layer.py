@@ -1,4 +1,4 @@
-"""What a review shows whatever the estimator: the floor, the true path, the readings as they came."""
+"""The layer of a review that is the same for all estimators: the floor, the true path, the readings as they came."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.review.canvas import Canvas, draw_path, thinned
 from benchmarks.review.cdf import LEAST_M, CdfAxes, draw_axes, round_step
 from benchmarks.review.frame import MARGIN, Frame
-from benchmarks.review.radio_circles import Heard
+from benchmarks.review.radio_circles import ReadingColumns
 from benchmarks.review.raw_sensors import draw_device_events, draw_raw_sensors, raw_series, worth_a_line
 from fusion import World
 from fusion.arrays import Floats, Stamps
@@ -22,7 +22,7 @@ ARROW_M = 0.75
 
 
 def draw_base(
-    canvas: Canvas, run: Run, frame: Frame, readings: Heard, axes: CdfAxes | None, legend: tuple[float, float]
+    canvas: Canvas, run: Run, frame: Frame, readings: ReadingColumns, axes: CdfAxes | None, legend: tuple[float, float]
 ) -> None:
     """The base layer; ``axes``: of the error distribution, None without truth; ``legend``: the truth's place in it."""
     _draw_floor(canvas, run.world)
@@ -38,7 +38,7 @@ def draw_base(
 
 
 def properties(run: Run, frame: Frame) -> dict[str, Any]:
-    """What the viewer tells of the recording when it is selected."""
+    """Properties of the recording, which the viewer shows when it is selected."""
     return {
         "log": str(run.path),
         "world": run.world.name,
@@ -81,7 +81,7 @@ def _draw_truth(canvas: Canvas, truth: TruthTrack) -> None:
 
 
 def _draw_heading(canvas: Canvas, time_ns: Stamps, xy: Floats, heading: Floats) -> None:
-    """Where the robot looks: an arrow from its true place at the time cursor, none while that is not known."""
+    """The true heading: an arrow from the true place at the time cursor, none while it is not known."""
     if not np.isfinite(heading).any():
         return
     origins, angle = thinned(xy), thinned(heading)
@@ -93,7 +93,7 @@ def _draw_heading(canvas: Canvas, time_ns: Stamps, xy: Floats, heading: Floats) 
     canvas.columns(place, thinned(time_ns), arrows)
 
 
-def _draw_readings(canvas: Canvas, world: World, readings: Heard) -> None:
+def _draw_readings(canvas: Canvas, world: World, readings: ReadingColumns) -> None:
     """Signal strengths [dBm] and ranges [m] as they came, one series per anchor."""
     for kind, chosen in (("rssi", ~readings.is_range), ("ranges", readings.is_range)):
         for anchor in np.unique(readings.anchor[chosen]).tolist():

@@ -1,6 +1,4 @@
-"""The layout of a review, so that nobody has to click: pages, and on the first the map on the left, what went wrong
-and why on the right.
-"""
+"""The layout of a review: pages, and on the first the map on the left, errors and their causes on the right."""
 
 from __future__ import annotations
 
@@ -68,12 +66,12 @@ def _overview(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa:
 
 
 def _reception(run: Run, drawn: Sequence[Drawing]) -> tuple[Any, float]:
-    """What the radio said and what was made of it, and their height; in front is what has something to tell."""
-    told = [drawing for drawing in drawn if drawing.shown and not drawing.is_counterfactual and drawing.states.state]
-    state = [state_view(told)] if told else []
-    eventful = any(state in (State.REJECT, State.LOST) for drawing in told for state in drawing.states.state)
+    """Radio readings and the states that followed, and the height of both; states in front where any was refused."""
+    judged = [drawing for drawing in drawn if drawing.shown and not drawing.is_counterfactual and drawing.states.state]
+    state = [state_view(judged)] if judged else []
+    eventful = any(state in (State.REJECT, State.LOST) for drawing in judged for state in drawing.states.state)
     if eventful:
-        return tabs(state + _radio(run)), max(1.5, 0.6 + 0.28 * len(told))
+        return tabs(state + _radio(run)), max(1.5, 0.6 + 0.28 * len(judged))
     return tabs(_radio(run) + state), 1.8
 
 
@@ -87,14 +85,14 @@ def _radio(run: Run) -> list[Any]:
 
 
 def _details(drawn: Sequence[Drawing]) -> list[Any]:
-    """A tab for each estimator: does its error fit its claim, and what happened to it?"""
+    """A tab for each estimator: its error on the claimed one, and its events."""
     import rerun.blueprint as rrb
 
     details = []
     for drawing in (drawing for drawing in drawn if not drawing.is_counterfactual):
         name, views = drawing.name, []
-        if any(drawing.claims):
-            views.append(tabs(_claims(drawing)))
+        if drawing.has_variance:
+            views.append(tabs(_component_errors(drawing)))
         # Behind each other, for four plots in a column are too low for the numbers on their axes.
         honesty = _honesty(drawing)
         views += [tabs(honesty)] if honesty else []
@@ -104,7 +102,7 @@ def _details(drawn: Sequence[Drawing]) -> list[Any]:
     return details
 
 
-def _claims(drawing: Drawing) -> list[Any]:
+def _component_errors(drawing: Drawing) -> list[Any]:
     """Each component of the error on what is claimed of it, all of either inside the plot."""
     import rerun as rr
 
@@ -135,7 +133,7 @@ def _honesty(drawing: Drawing) -> list[Any]:
     import rerun as rr
 
     name, views = drawing.name, []
-    if any(drawing.claims):
+    if drawing.has_variance:
         title = f"{name}: NEES; 95 % should lie between the lines"
         views.append(plot(title, rr.new_entity_path(["nees", name]), span=upward(_nees_top(drawing)), legend=False))
     if drawing.reviewed.clouds is not None:
@@ -151,7 +149,7 @@ def _nees_top(drawing: Drawing) -> float:
 
 
 def _readings(run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
-    """The radio in full: what was read, and how far each estimator believed it."""
+    """The radio in full: all readings, and the weight that each estimator gave them."""
     import rerun as rr
     import rerun.blueprint as rrb
 
@@ -160,7 +158,7 @@ def _readings(run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
         name = drawing.name
         weight = f"{name}: weight of readings, coloured as above"
         views = [plot(weight, rr.new_entity_path(["weight", name]), span=upward(1.0), legend=False)]
-        if drawing.tells_nis:
+        if drawing.has_nis:
             nis = f"{name}: NIS of readings; the line is exceeded once in twenty"
             views.append(plot(nis, rr.new_entity_path(["nis", name]), span=upward(NIS_SHOWN), legend=False))
         gates.append(rrb.Vertical(*views, name=name))
@@ -168,7 +166,7 @@ def _readings(run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
 
 
 def _motion(run: Run) -> Any:  # noqa: ANN401
-    """The motion sensors as they came, and what became of the devices, where a recorder told it."""
+    """The motion sensors as they came, and events of the devices, where a recorder logged them."""
     import rerun.blueprint as rrb
 
     speeds = plot("Speed (m/s)", f"/raw/{SPEED}")

@@ -1,4 +1,4 @@
-"""Where a review is drawn: one Rerun recording, written in whole columns.
+"""The canvas of a review: one Rerun recording, written in whole columns.
 
 A row sent alone costs two hundred times more than a row in a column; only what holds at all times is logged.
 """
@@ -36,7 +36,7 @@ class Canvas(NamedTuple):
     timelines: tuple[str, ...] = (TIMELINE,)
 
     def style(self, path: Place, *archetypes: Any) -> None:  # noqa: ANN401 - Rerun's own values
-        """What holds at all times."""
+        """Log values that hold at all times."""
         self.recording.log(self.rr.new_entity_path(list(path)), *archetypes, static=True)
 
     def columns(self, path: Place, time_ns: Stamps, *columns: Any) -> None:  # noqa: ANN401
@@ -104,7 +104,7 @@ JUMP_M_S = 5.0
 def draw_path(
     canvas: Canvas, place: Place, colour: Colour, time_ns: Stamps, xy: Floats, *, thickness: float = 1.0
 ) -> None:
-    """Positions ``xy`` (n, 2) [m]; how far back the strong part goes is the layout's to say."""
+    """Positions ``xy`` (n, 2) [m]; the layout determines how far back the strong part goes."""
     rr = canvas.rr
     time_ns, xy = thinned(time_ns), thinned(xy)
     if len(xy) == 0:
@@ -119,6 +119,6 @@ def draw_path(
 
 
 def mostly_jumps(time_ns: Stamps, xy: Floats) -> bool:
-    """Whether most of a path's length is jumps, as of a method without memory: lines there would hide the map."""
+    """True where most of a path's length is jumps, as of a method without memory: lines there would hide the map."""
     steps_m, steps_s = np.hypot(*np.diff(xy, axis=0).T), np.diff(time_ns) / NANOSECONDS
     return bool(steps_m[steps_m > JUMP_M_S * steps_s].sum() > 0.5 * steps_m.sum())

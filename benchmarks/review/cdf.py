@@ -1,6 +1,6 @@
 """The distribution of position errors as a picture: Rerun has no plots of one value over another, so it is drawn.
 
-A curve tells which share of all instants had an error of at most so much. Instants without a valid answer never have:
+A curve shows which share of all instants had an error of at most so much. Instants without a valid answer never have:
 the curve saturates at the availability.
 """
 

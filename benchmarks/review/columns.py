@@ -1,4 +1,4 @@
-"""The path of an estimator and what it claims of itself, as columns for drawing: final estimates, in time order."""
+"""The path and the flags of an estimator as columns for drawing: final estimates, in time order."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fusion.arrays import Flags, Floats, Stamps, Whole
 
 
 class EstimateColumns(NamedTuple):
-    """The estimates of an estimator in time order, all (n,): what they claim of themselves."""
+    """Flags and times of an estimator's estimates in time order, all (n,)."""
 
     time_ns: Stamps
     valid: Flags
@@ -24,13 +24,13 @@ class EstimateColumns(NamedTuple):
     @classmethod
     def of_updates(cls, updates: Sequence[Update]) -> EstimateColumns:
         """The estimates of ``updates``; ``p_lost`` is NaN where a method has no opinion."""
-        said = [update.estimate for update in updates]
-        time_ns, _, _, valid, _, p_lost, reset_count, _ = (field(said, i) for i in range(8))
+        estimates = [update.estimate for update in updates]
+        time_ns, _, _, valid, _, p_lost, reset_count, _ = (field(estimates, i) for i in range(8))
         return cls(
-            np.fromiter(time_ns, np.int64, len(said)),
-            np.fromiter(valid, np.bool_, len(said)),
+            np.fromiter(time_ns, np.int64, len(estimates)),
+            np.fromiter(valid, np.bool_, len(estimates)),
             np.array(list(p_lost), dtype=np.float64),
-            np.fromiter(reset_count, np.int64, len(said)),
+            np.fromiter(reset_count, np.int64, len(estimates)),
         )
 
 

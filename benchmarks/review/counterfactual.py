@@ -1,4 +1,4 @@
-"""What if: the same run with something taken out, for estimates that are drawn thin beside the real ones."""
+"""Counterfactuals: the same run with something taken out, for estimates that are drawn thin beside the real ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from logs.run import Run
 
 
 class Counterfactual(NamedTuple):
-    """A run that did not happen; ``suffix`` says how it differs, behind an estimator's name."""
+    """A run that did not happen; ``suffix`` states the difference, behind an estimator's name."""
 
     suffix: str
     run: Run
@@ -22,18 +22,18 @@ class Counterfactual(NamedTuple):
 
 def counterfactuals(run: Run, without: Sequence[str], reject_s: Sequence[float]) -> list[Counterfactual]:
     """One for each anchor of ``without`` and each time of ``reject_s``, each of them once; raises `ParameterError`."""
-    found = [without_anchor(run, anchor) for anchor in without] + [without_radio_at(run, at_s) for at_s in reject_s]
-    return list({counterfactual.suffix: counterfactual for counterfactual in found}.values())
+    chosen = [without_anchor(run, anchor) for anchor in without] + [without_radio_at(run, at_s) for at_s in reject_s]
+    return list({counterfactual.suffix: counterfactual for counterfactual in chosen}.values())
 
 
 def without_anchor(run: Run, anchor: str) -> Counterfactual:
-    """``run`` as if the radio had never heard ``anchor``; raises `ParameterError` when it never did."""
-    heard = {
+    """``run`` as if the radio had never received ``anchor``; raises `ParameterError` when it never did."""
+    received = {
         reading.anchor for scan in run.measurements if isinstance(scan, WifiScan | Ranges) for reading in scan.readings
     }
-    if anchor not in heard:
+    if anchor not in received:
         raise ParameterError(
-            f"--without {anchor}: {run.path} holds no reading of that anchor; {did_you_mean(anchor, heard)}"
+            f"--without {anchor}: {run.path} holds no reading of that anchor; {did_you_mean(anchor, received)}"
         )
     kept = tuple(left for measurement in run.measurements if (left := _less(measurement, anchor)) is not None)
     return Counterfactual(f"without {anchor}", replace(run, measurements=kept))

@@ -16,15 +16,16 @@ from benchmarks.review.columns import DrawnTrack, EstimateColumns
 from benchmarks.review.events import Events, States, events, states
 from benchmarks.review.folding import Reviewed
 from benchmarks.runner.leaderboard import Entry, rank
+from benchmarks.runner.reference import Reference
 from benchmarks.runner.scoring import Score
 from fusion import Decision, Reason, Update
 from fusion.arrays import Floats, Whole
 from fusion.output.colours import Colour, colour_of
 from logs.run import Run
-from logs.truth import Instants, evaluation_instants, wrap_angles
+from logs.truth import Instants, wrap_angles
 
 SHOWN = 6
-"""Tracks that are switched on, the best ones: more cannot be told apart. The eye beside an entity shows the others."""
+"""Tracks that are switched on, the best ones; the eye beside an entity shows the others."""
 
 
 class SignedErrors(NamedTuple):
@@ -73,7 +74,7 @@ class Drawing:
 
     @property
     def is_counterfactual(self) -> bool:
-        """Whether it shows what would have been, and is drawn thin."""
+        """True where it is of a run that did not happen, and is drawn thin."""
         return self.reviewed.counterfactual_of is not None
 
     @property
@@ -88,12 +89,12 @@ class Drawing:
 
     @cached_property
     def estimates(self) -> EstimateColumns:
-        """What it claims of itself."""
+        """Its estimates, as columns."""
         return EstimateColumns.of_updates(self.final)
 
     @property
     def fates(self) -> FateColumns:
-        """What became of the readings."""
+        """The final fates of the readings."""
         return self.reviewed.made.fates
 
     @cached_property
@@ -103,23 +104,23 @@ class Drawing:
 
     @cached_property
     def states(self) -> States:
-        """When its state changed."""
+        """Its changes of state."""
         return states(self.estimates, self.fates, self.fate_update)
 
     @cached_property
     def events(self) -> Events:
-        """What happened to it."""
+        """Its events."""
         return events(self.final, self.estimates, self.fates)
 
     @cached_property
     def gates(self) -> bool:
-        """Whether it uses radio at all, so that there is a weight to show; of a counterfactual none is shown."""
-        unheard = self.fates.met(Reason.KIND_NOT_CONSUMED) | self.fates.met(Decision.LATE)  # which may be of anything
-        return not self.is_counterfactual and not bool(unheard.all())
+        """True where it uses radio at all, so that there is a weight to show; of a counterfactual none is shown."""
+        unused = self.fates.met(Reason.KIND_NOT_CONSUMED) | self.fates.met(Decision.LATE)  # which may be of anything
+        return not self.is_counterfactual and not bool(unused.all())
 
     @cached_property
-    def tells_nis(self) -> bool:
-        """Whether any reading has an NIS."""
+    def has_nis(self) -> bool:
+        """True where any reading has an NIS."""
         return bool(np.isfinite(self.fates.nis).any())
 
     @cached_property
@@ -128,22 +129,22 @@ class Drawing:
         return None if self.instants is None or self.answers is None else signed_errors(self.instants, self.answers)
 
     @cached_property
-    def claims(self) -> list[bool]:
-        """Whether it ever claims a variance of x, y and heading."""
-        return [False] * 3 if self.errors is None else [bool(np.isfinite(v).any()) for v in self.errors.variance.T]
+    def has_variance(self) -> bool:
+        """True where it ever claims a variance of x, y or heading."""
+        return self.errors is not None and bool(np.isfinite(self.errors.variance).any())
 
 
 def drawings(run: Run, reviewed: Sequence[Reviewed]) -> list[Drawing]:
     """The estimators with their scores, the best first. A counterfactual is shown where its estimator is."""
-    instants = None if run.truth is None else evaluation_instants(run.truth)
+    instants = Reference.of(run).instants
     ranking = sorted(reviewed, key=lambda one: rank(entry_of(one)))
     best = [one.name for one in ranking if one.counterfactual_of is None][:SHOWN]
     return [_drawing(one, instants, shown=(one.counterfactual_of or one.name) in best) for one in ranking]
 
 
-def _drawing(reviewed: Reviewed, instants: Instants | None, *, shown: bool) -> Drawing:
+def _drawing(reviewed: Reviewed, instants: Instants, *, shown: bool) -> Drawing:
     made, scored = reviewed.made, reviewed.score
-    if instants is None or scored.errors is None or made.error is not None:
+    if scored.errors is None or made.error is not None:
         return Drawing(reviewed, shown, None, None)
     return Drawing(reviewed, shown, instants, match(instants, made.track))
 

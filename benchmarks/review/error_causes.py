@@ -1,7 +1,7 @@
-"""What pulled an estimate off the truth just before a moment: how its error grew, and which readings said so.
+"""Causes of an error just before a moment: the growth of the error, and the readings that misled.
 
-A filter sees no truth and calls a reading surprising by its own belief, right or wrong. Here every reading is held
-against what the world's model gives for the true place: that tells the anchor that misled, and the gate that erred.
+A filter has no truth and calls a reading surprising by its own belief, right or wrong. Here every reading is compared
+with the world's model at the true place: that shows the anchor that misled, and the gate that erred.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from fusion.arrays import Floats
 from logs.truth import Instants, interpolate_truth
 
 MISLEADING = 1.0
-"""Standard deviations by which an anchor's readings are off, on average, before they are said to have misled."""
+"""Standard deviations by which an anchor's readings are off, on average, from which they count as misleading."""
 OUTLIER = 3.0
 """Standard deviations from which a single reading is worth a word, where all together were right."""
 
@@ -35,7 +35,7 @@ class Growth(NamedTuple):
 
 class Misreading(NamedTuple):
     """Readings of one anchor that were all taken, or all not, on average: how much farther [m] than it was they put it,
-    and how many standard deviations of one reading they were off, either way, by all that the world says of noise.
+    and how many standard deviations of one reading they were off, either way, by the noise that the world states.
     ``alone``: it is the one outlier among others that were right.
     """
 
@@ -47,7 +47,7 @@ class Misreading(NamedTuple):
 
 
 def growth(updates: Sequence[Update], truth: Instants) -> Growth | None:
-    """How the position error changed over ``updates`` in time order; None where fewer than two can be judged."""
+    """Change of the position error over ``updates`` in time order; None where fewer than two can be judged."""
     place_m = _truth_at(truth, [update.estimate.time_ns for update in updates])
     errors_m = [
         math.hypot(x - update.estimate.pose.x, y - update.estimate.pose.y) if update.estimate.valid else math.nan
@@ -64,7 +64,7 @@ def growth(updates: Sequence[Update], truth: Instants) -> Growth | None:
 
 
 def misreadings(world: World, updates: Sequence[Update], truth: Instants) -> Iterator[Misreading]:
-    """Of each anchor that was listened to in ``updates``, in the order they were first heard."""
+    """Of each anchor whose readings were judged in ``updates``, in the order of their first reading."""
     off = _readings_off(world, updates, truth)
     for (anchor, taken), rows in off.items():
         farther_m, sigmas = np.mean(rows, axis=0).tolist()
@@ -84,7 +84,7 @@ def _readings_off(
     # A heading that is not known misplaces an antenna by its distance from the robot's middle at most.
     places = Places.of_poses(world, x, y, np.nan_to_num(heading))
     anchors = {anchor.id: anchor for anchor in world.anchors}
-    found: dict[tuple[str, bool], list[tuple[float, float]]] = {}
+    residuals: dict[tuple[str, bool], list[tuple[float, float]]] = {}
     for i, (scan, fates) in enumerate(scans):
         readings = {reading.anchor: reading for reading in scan.readings}
         judged = [fate for fate in fates if fate.reason is not Reason.KIND_NOT_CONSUMED]
@@ -92,12 +92,12 @@ def _readings_off(
             off = _off(anchors[fate.anchor], readings[fate.anchor], places, i)
             if math.isfinite(off[1]):
                 taken = fate.decision in (Decision.USED, Decision.DOWNWEIGHTED)
-                found.setdefault((fate.anchor, taken), []).append(off)
-    return found
+                residuals.setdefault((fate.anchor, taken), []).append(off)
+    return residuals
 
 
 def _off(anchor: Anchor, reading: RssiReading | RangeReading, places: Places, i: int) -> tuple[float, float]:
-    """How much farther [m] than the ``i``-th place a reading is, and how many standard deviations above its due."""
+    """Excess distance [m] of a reading over the ``i``-th place, and its residual in standard deviations."""
     is_range = isinstance(reading, RangeReading)
     model, value = anchor.model("range" if is_range else "rssi"), reading[1]
     offset = (places.x[i] - anchor.x, places.y[i] - anchor.y, places.height - anchor.z)
@@ -109,9 +109,9 @@ def _off(anchor: Anchor, reading: RssiReading | RangeReading, places: Places, i:
 
 def _truth_at(truth: Instants, time_ns: Sequence[int]) -> Floats:
     """True x, y [m] and heading [rad] (n, 3); NaN before, after, and in gaps of the truth."""
-    stamps, found = np.array(time_ns, dtype=np.int64), np.full((len(time_ns), 3), np.nan)
+    stamps, poses = np.array(time_ns, dtype=np.int64), np.full((len(time_ns), 3), np.nan)
     if len(truth) >= 2:
         inside = np.flatnonzero((stamps >= truth.time_ns[0]) & (stamps <= truth.time_ns[-1]))
         at, kept = interpolate_truth(truth, stamps[inside], gap_s=MAX_AGE_S)
-        found[inside[kept]] = np.column_stack([at.x, at.y, at.heading])[kept]
-    return found
+        poses[inside[kept]] = np.column_stack([at.x, at.y, at.heading])[kept]
+    return poses

@@ -9,7 +9,7 @@ from benchmarks.metrics.fates import Codes, fates_of
 from benchmarks.metrics.score import CHI_SQUARE_95
 from benchmarks.review.canvas import STRONG, Canvas, Place, draw_path, thinned
 from benchmarks.review.drawing import Drawing
-from benchmarks.review.radio_circles import Heard
+from benchmarks.review.radio_circles import ReadingColumns
 from fusion import Reason, World
 from fusion.arrays import Flags, Floats, Stamps, Whole
 from fusion.output.colours import ANCHOR, REFUSED
@@ -17,7 +17,7 @@ from fusion.values import nanoseconds
 
 CIRCLE_OPACITY = 130
 CIRCLE_S = 1.0
-"""How long a reading is seen: readings this close together count as one view of the anchors."""
+"""Time for which a reading is shown: readings this close together count as one view of the anchors."""
 PARTICLE_OPACITY, PARTICLE_PIXELS = (70, 200), (0.75, 2.25)
 """Opacity and radius of a particle without weight, and of the heaviest one of its cloud."""
 COUNTERFACTUAL_THICKNESS = 0.5
@@ -25,11 +25,13 @@ COUNTERFACTUAL_THICKNESS = 0.5
 
 
 def thickness(drawing: Drawing) -> float:
-    """How thick an estimator is drawn."""
+    """Thickness of an estimator's lines."""
     return COUNTERFACTUAL_THICKNESS if drawing.is_counterfactual else 1.0
 
 
-def draw_on_map(canvas: Canvas, world: World, readings: Heard, drawing: Drawing, legend: tuple[float, float]) -> None:
+def draw_on_map(
+    canvas: Canvas, world: World, readings: ReadingColumns, drawing: Drawing, legend: tuple[float, float]
+) -> None:
     """The estimator's part of the map; ``legend``: its place in the legend."""
     place = ["map", "estimate", drawing.name]
     text = drawing.name if drawing.shown else f"{drawing.name} (hidden)"
@@ -81,9 +83,9 @@ def _draw_error_line(canvas: Canvas, place: Place, drawing: Drawing) -> None:
     canvas.columns(place, drawing.instants.time_ns[chosen], rows)
 
 
-def _draw_circles(canvas: Canvas, place: Place, world: World, readings: Heard, drawing: Drawing) -> None:
-    """Where the newest reading of each anchor puts the robot, a circle around it: in the anchor's yellow when the
-    estimator believed it wholly, vermillion when not at all.
+def _draw_circles(canvas: Canvas, place: Place, world: World, readings: ReadingColumns, drawing: Drawing) -> None:
+    """The circle around each anchor on which its newest reading puts the robot: in the anchor's yellow when the
+    estimator gave it full weight, vermillion when none.
     """
     fates, rr = drawing.fates, canvas.rr
     radius_m = readings.radii(fates_of(drawing.final))
@@ -105,11 +107,11 @@ def _draw_circles(canvas: Canvas, place: Place, world: World, readings: Heard, d
 
 
 def newest(time_ns: Stamps, anchor: Codes, drawn: Flags, end_ns: int) -> tuple[Stamps, Whole, Whole]:
-    """What is to be seen of readings (n,) in time order, as rows of a table: from when on [ns] (m,), up to ``end_ns``,
-    the readings seen then, row after row, and how many each row has (m,).
+    """Readings (n,) in time order as rows of a table: the time from which each row is shown [ns] (m,), up to
+    ``end_ns``, the readings shown then, row after row, and the number of each row (m,).
 
-    Of each anchor the newest, for `CIRCLE_S`: many devices tell one range a message. Those not ``drawn`` are not seen,
-    and hide what the anchor said before.
+    Of each anchor the newest, for `CIRCLE_S`: many devices send one range a message. Those not ``drawn`` are not shown,
+    and hide the anchor's reading before.
     """
     edges_ns = np.unique(np.concatenate([time_ns, time_ns + nanoseconds(CIRCLE_S)]))
     edges_ns = edges_ns[edges_ns <= end_ns]

@@ -15,7 +15,7 @@ from fusion.arrays import Floats, Stamps
 from fusion.output.colours import LOST, REFUSED, TAKEN, TRUTH, UNSURE, anchor_colour
 
 NIS_LIMIT = 3.841458820694124
-"""What the NIS of one scalar reading exceeds once in twenty, if the filter is honest (chi-square, one degree)."""
+"""95 % point of the NIS of one scalar reading, if the filter is honest (chi-square, one degree)."""
 NEES_BOUNDS = {2: (0.05063561596857975, 7.377758908227871), 3: (0.21579528262389785, 9.348403604496148)}
 """Between them lie 95 % of the NEES of an honest filter, 2.5 % on either side (chi-square of 2 and 3 degrees)."""
 STATE_COLOURS = {State.INIT: UNSURE, State.ACCEPT: TAKEN, State.REJECT: REFUSED, State.LOST: LOST}
@@ -74,7 +74,7 @@ def _draw_consistency(canvas: Canvas, drawing: Drawing) -> None:
 def _draw_nees(canvas: Canvas, drawing: Drawing) -> None:
     """NEES between its bounds, which depend on whether a heading is judged."""
     errors = drawing.score.errors
-    if drawing.instants is None or errors is None or not any(drawing.claims):
+    if drawing.instants is None or errors is None or not drawing.has_variance:
         return
     time_ns, place = drawing.instants.time_ns, ["nees", drawing.name]
     canvas.line([*place, "NEES"], "NEES", drawing.colour, time_ns, errors.nees, merge="Max")
@@ -100,13 +100,13 @@ def corners(time_ns: Stamps, values: Floats) -> tuple[Stamps, Floats]:
 def _draw_gating(canvas: Canvas, world: World, frame: Frame, drawing: Drawing) -> None:
     """Weight and NIS of every reading, one series per anchor; a reading without anchor goes by its sensor."""
     fates, name = drawing.fates, drawing.name
-    heard, source = ~fates.met(Reason.KIND_NOT_CONSUMED), fates.source
-    for code in np.unique(source[heard]).tolist():
-        own, anchor = heard & (source == code), str(fates.names[code])
+    consumed, source = ~fates.met(Reason.KIND_NOT_CONSUMED), fates.source
+    for code in np.unique(source[consumed]).tolist():
+        own, anchor = consumed & (source == code), str(fates.names[code])
         colour = anchor_colour(world, anchor)
         canvas.dots(["weight", name, anchor], anchor, colour, fates.time_ns[own], fates.weight[own])
         canvas.dots(["nis", name, anchor], anchor, colour, fates.time_ns[own], fates.nis[own])
-    if drawing.tells_nis:
+    if drawing.has_nis:
         edges = np.array([frame.start_ns, frame.end_ns])
         canvas.line(["nis", name, "95 % limit"], "95 % limit", TRUTH, edges, np.full(2, NIS_LIMIT))
 
@@ -122,6 +122,6 @@ def _draw_states(canvas: Canvas, drawing: Drawing) -> None:
 
 
 def _draw_events(canvas: Canvas, drawing: Drawing) -> None:
-    told = drawing.events
-    if told.text:
-        canvas.text(["events", drawing.name], told.time_ns, told.level, told.text)
+    events = drawing.events
+    if events.text:
+        canvas.text(["events", drawing.name], events.time_ns, events.level, events.text)

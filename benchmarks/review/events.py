@@ -1,6 +1,6 @@
-"""What happened to an estimator, in words: the state it was in, and the events worth a line.
+"""States of an estimator over time, and its events in words.
 
-States are told by what became of radio readings and by what the estimates claim, so they mean the same for every
+States follow from the fates of radio readings and from the estimates' own flags, so they mean the same for every
 method.
 """
 
@@ -20,13 +20,13 @@ from fusion.arrays import Stamps, Whole
 LOST_PROBABILITY = 0.5
 """An estimator that is more likely lost than not, is."""
 OWN_REFUSALS = (Reason.TOO_FEW_ANCHORS, Reason.COLLINEAR_ANCHORS)
-"""Unusable by the estimator's own judgement; the host's refusals say nothing about the estimator."""
+"""Unusable by the estimator's own judgement; the host's refusals do not depend on the estimator."""
 
 
 @unique
 class State(Enum):
-    """INIT: no position yet, or no reading heard yet. ACCEPT, REJECT: something, or nothing, of the last scan was
-    taken. LOST: no valid position, or the estimator itself says so.
+    """INIT: no position yet, or no reading judged yet. ACCEPT, REJECT: something, or nothing, of the last scan was
+    taken. LOST: no valid position, or the estimator itself reports it.
     """
 
     INIT = 0
@@ -87,14 +87,14 @@ Row = tuple[int, str, str]
 
 
 def _readings(fates: FateColumns) -> list[Row]:
-    """One line per reading that was not taken; what a method does not listen to is no event."""
+    """One line per reading that was not taken; a reading of a kind that a method does not use is no event."""
     chosen = fates.met(Decision.REJECTED, Decision.LATE, Decision.UNUSABLE) & ~fates.met(Reason.KIND_NOT_CONSUMED)
     columns = (fates.time_ns, fates.names[fates.source], fates.decision, fates.reason, fates.nis)
     rows = zip(*(column[chosen].tolist() for column in columns), strict=True)
-    return [(t, *_told(name, DECISIONS[decision], REASONS[reason], nis)) for t, name, decision, reason, nis in rows]
+    return [(t, *_line(name, DECISIONS[decision], REASONS[reason], nis)) for t, name, decision, reason, nis in rows]
 
 
-def _told(name: str, decision: Decision, reason: Reason, nis: float) -> tuple[str, str]:
+def _line(name: str, decision: Decision, reason: Reason, nis: float) -> tuple[str, str]:
     why = reason.value.replace("_", " ")
     surprise = f", NIS {nis:.1f}" if np.isfinite(nis) else ""
     level = "WARN" if decision is Decision.REJECTED else "INFO"
@@ -112,5 +112,5 @@ def _resets(updates: Sequence[Update], reset_count: Whole) -> list[Row]:
 
 def _losses(estimates: EstimateColumns) -> list[Row]:
     changes = np.flatnonzero(np.diff(estimates.valid, prepend=True))
-    told = {True: ("INFO", "position valid again"), False: ("ERROR", "no valid position")}
-    return [(t, *told[valid]) for t, valid in zip(*(c[changes].tolist() for c in estimates[:2]), strict=True)]
+    lines = {True: ("INFO", "position valid again"), False: ("ERROR", "no valid position")}
+    return [(t, *lines[valid]) for t, valid in zip(*(c[changes].tolist() for c in estimates[:2]), strict=True)]

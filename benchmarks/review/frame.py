@@ -13,7 +13,7 @@ from logs.run import Run
 TIMELINE = "t"
 """Time since the run's start."""
 UTC = "utc"
-"""The same as date and time of day, where the stamps tell them."""
+"""The same as date and time of day, where the stamps are Unix time."""
 UNIX_SINCE_NS = 1_000_000_000 * NANOSECONDS
 """Stamps from here on, September 2001, count from 1970: no clock that counts from its own start has run so long."""
 MARGIN = 0.06

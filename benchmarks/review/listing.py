@@ -11,8 +11,8 @@ from benchmarks.runner.review_command import review_command
 from fusion.cli.options import Settings
 
 
-def told(moments: Sequence[Moment], run: Sequence[str], settings: Settings, seed: int) -> list[str]:
-    """The worst moments as lines: what, why, and how to look at it; ``run``: the words that name it."""
+def as_lines(moments: Sequence[Moment], run: Sequence[str], settings: Settings, seed: int) -> list[str]:
+    """The worst moments as lines, each with its review command; ``run``: the words that name the run."""
     lines = []
     for moment in moments:
         params = settings.get(moment.estimator)
@@ -22,7 +22,7 @@ def told(moments: Sequence[Moment], run: Sequence[str], settings: Settings, seed
 
 
 def line(moment: Moment) -> str:
-    """What happened, and why."""
+    """One moment with its error, its causes and its counterfactuals."""
     grown = "" if moment.growth is None or not math.isfinite(moment.error_m) else f" ({_grown(moment.growth)})"
     facts = [*moment.causes, *(f"{name}: {_length(error_m)}" for name, error_m in moment.otherwise.items())]
     return f"{moment.estimator} at {moment.at_s:.2f} s: {_length(moment.error_m)}{grown}; {'; '.join(facts)}"

@@ -1,4 +1,4 @@
-"""The worst moments of an estimator, and what its readings were like just before: where to look first."""
+"""The worst moments of an estimator, each with its causes: the state of estimates and readings just before."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fusion.values import nanoseconds, seconds
 from logs.run import Run
 
 JUST_BEFORE_S = 5.0
-"""How far back a cause is looked for."""
+"""Span before a moment in which causes are looked for."""
 SILENCE_S = 2.0
 """A shorter gap in the readings is nothing unusual."""
 ENOUGH_ANCHORS = 3
@@ -75,7 +75,7 @@ def _updates_before(drawing: Drawing, at_ns: int) -> Sequence[Update]:
 
 
 def _causes(run: Run, drawing: Drawing, recent: Sequence[Update], at_ns: int) -> Iterator[str]:
-    """What was unusual just before ``at_ns``, in words."""
+    """The causes just before ``at_ns``, in words."""
     yield from _of_estimates(drawing, at_ns)
     if drawing.gates:
         yield from _of_reception(drawing.fates, at_ns)
@@ -87,25 +87,25 @@ def _causes(run: Run, drawing: Drawing, recent: Sequence[Update], at_ns: int) ->
 
 
 def _of_estimates(drawing: Drawing, at_ns: int) -> Iterator[str]:
-    said = drawing.estimates
-    last = int(np.searchsorted(said.time_ns, at_ns, side="right")) - 1
+    estimates = drawing.estimates
+    last = int(np.searchsorted(estimates.time_ns, at_ns, side="right")) - 1
     if last < 0:
         yield "no estimate yet"
         return
-    if at_ns - said.time_ns[last] > nanoseconds(MAX_AGE_S):
-        yield f"no estimate for {_length(at_ns - int(said.time_ns[last]))}"
-    elif not said.valid[last]:
+    if at_ns - estimates.time_ns[last] > nanoseconds(MAX_AGE_S):
+        yield f"no estimate for {_length(at_ns - int(estimates.time_ns[last]))}"
+    elif not estimates.valid[last]:
         yield "no valid position"
-    first = int(np.searchsorted(said.time_ns, at_ns - nanoseconds(JUST_BEFORE_S), side="right"))
-    resets = int(said.reset_count[last] - said.reset_count[min(first, last)])
+    first = int(np.searchsorted(estimates.time_ns, at_ns - nanoseconds(JUST_BEFORE_S), side="right"))
+    resets = int(estimates.reset_count[last] - estimates.reset_count[min(first, last)])
     if resets > 0:
         yield f"belief replaced {resets} times" if resets > 1 else "belief replaced"
 
 
 def _of_reception(fates: FateColumns, at_ns: int) -> Iterator[str]:
-    """Silence, or too few anchors at once: of what the host let through."""
-    heard = fates.met(Decision.USED, Decision.DOWNWEIGHTED, Decision.REJECTED) | fates.met(*OWN_REFUSALS)
-    time_ns, names = fates.time_ns[heard], fates.names[fates.source[heard]]
+    """Silence, or too few anchors at once, among the readings that the host let through."""
+    passed = fates.met(Decision.USED, Decision.DOWNWEIGHTED, Decision.REJECTED) | fates.met(*OWN_REFUSALS)
+    time_ns, names = fates.time_ns[passed], fates.names[fates.source[passed]]
     end = int(np.searchsorted(time_ns, at_ns, side="right"))
     if end == 0:
         yield "no radio yet"
@@ -120,7 +120,7 @@ def _of_reception(fates: FateColumns, at_ns: int) -> Iterator[str]:
 
 
 def _last_view(time_ns: list[int], names: list[str]) -> int | None:
-    """The last time [ns] at which enough anchors had been heard within `TOGETHER_S`, None: never."""
+    """The last time [ns] at which enough anchors had been received within `TOGETHER_S`, None: never."""
     within, start = Counter[str](), len(names)
     for end in range(len(names) - 1, -1, -1):
         while start > 0 and time_ns[start - 1] > time_ns[end] - nanoseconds(TOGETHER_S):
@@ -133,7 +133,7 @@ def _last_view(time_ns: list[int], names: list[str]) -> int | None:
 
 
 def _of_judgement(fates: FateColumns, at_ns: int) -> Iterator[str]:
-    """What became of the readings just before."""
+    """Decisions on the readings just before."""
     recent = (fates.time_ns <= at_ns) & (fates.time_ns > at_ns - nanoseconds(JUST_BEFORE_S))
     recent &= ~fates.met(Reason.KIND_NOT_CONSUMED)
     total = int(recent.sum())
@@ -152,15 +152,15 @@ def _of_truth(run: Run, drawing: Drawing, recent: Sequence[Update]) -> Iterator[
     """The anchor that misled most, and those that were right and not believed."""
     if drawing.instants is None:
         return
-    found = list(misreadings(run.world, recent, drawing.instants))
-    misled = [one for one in found if one.taken and one.sigmas >= MISLEADING]
+    judged = list(misreadings(run.world, recent, drawing.instants))
+    misled = [one for one in judged if one.taken and one.sigmas >= MISLEADING]
     if misled:
         worst = max(misled, key=lambda one: one.sigmas)
         side = "farther" if worst.farther_m > 0.0 else "nearer"
         what = f"one reading of {worst.anchor}" if worst.alone else worst.anchor
         yield f"believed {what}, {abs(worst.farther_m):.2f} m {side} than it was ({worst.sigmas:.1f}σ)"
-    believed = {one.anchor for one in found if one.taken}
-    right = [one.anchor for one in found if one.sigmas < MISLEADING and one.anchor not in believed]
+    taken = {one.anchor for one in judged if one.taken}
+    right = [one.anchor for one in judged if one.sigmas < MISLEADING and one.anchor not in taken]
     if right:
         yield f"did not believe {', '.join(right)}, though right"
 

@@ -50,7 +50,7 @@ class CloudWatch:
         self._seen += 1
 
     def clouds(self) -> Clouds | None:
-        """What was seen; None where there were no particles."""
+        """The clouds; None where there were no particles."""
         if not self._kept:
             return None
         kept = list(self._kept.values())

@@ -1,4 +1,4 @@
-"""All radio readings of a run as columns, and the circle on the floor that each one speaks of."""
+"""All radio readings of a run as columns, and the circle on the floor that each puts the robot on."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from fusion import Fate, Measurement, RangeReading, Ranges, RssiReading, WifiSca
 from fusion.arrays import Floats, Stamps
 
 Identity: TypeAlias = tuple[int, str, int, str]
-"""Time [ns], sensor, sequence number and anchor: what names one reading in a run."""
+"""Time [ns], sensor, sequence number and anchor: the identity of one reading in a run."""
 
 
-class Heard(NamedTuple):
+class ReadingColumns(NamedTuple):
     """The readings in the order they came, all (n,): ``value`` [dBm] or, where ``is_range``, [m]. ``radius_of``:
     the radius [m] of the circle around the anchor on which a reading puts the robot, by the reading's identity; NaN for
     an anchor the world does not know.
@@ -30,23 +30,23 @@ class Heard(NamedTuple):
     value: Floats
     radius_of: Mapping[Identity, float]
 
+    @classmethod
+    def of_run(cls, world: World, measurements: Sequence[Measurement]) -> ReadingColumns:
+        """Every radio reading among ``measurements``."""
+        scans = [scan for scan in measurements if isinstance(scan, WifiScan | Ranges)]
+        pairs = [(scan, reading) for scan in scans for reading in scan.readings]
+        identity = [(scan.time_ns, scan.sensor, scan.seq, reading.anchor) for scan, reading in pairs]
+        time_ns = np.array([entry[0] for entry in identity], dtype=np.int64)
+        anchor = np.array([entry[3] for entry in identity], dtype=np.str_)
+        is_range = np.array([isinstance(reading, RangeReading) for _, reading in pairs], dtype=np.bool_)
+        value = np.array([_value(reading) for _, reading in pairs], dtype=np.float64)
+        radius_m = _radii(world, anchor, is_range, value)
+        return cls(time_ns, anchor, is_range, value, dict(zip(identity, radius_m.tolist(), strict=True)))
+
     def radii(self, fates: Sequence[Fate]) -> Floats:
-        """The radius [m] that each of ``fates`` (m,) speaks of; NaN for a reading that makes no circle."""
+        """The radius [m] of the reading of each of ``fates`` (m,); NaN for a reading that makes no circle."""
         radius_m = map(self.radius_of.get, map(itemgetter(slice(4)), fates), repeat(math.nan))
         return np.fromiter(radius_m, np.float64, len(fates))
-
-
-def heard(world: World, measurements: Sequence[Measurement]) -> Heard:
-    """Every radio reading among ``measurements``."""
-    scans = [scan for scan in measurements if isinstance(scan, WifiScan | Ranges)]
-    identity = [(scan.time_ns, scan.sensor, scan.seq, reading.anchor) for scan in scans for reading in scan.readings]
-    readings = [reading for scan in scans for reading in scan.readings]
-    time_ns = np.array([entry[0] for entry in identity], dtype=np.int64)
-    anchor = np.array([entry[3] for entry in identity], dtype=np.str_)
-    is_range = np.array([isinstance(reading, RangeReading) for reading in readings], dtype=np.bool_)
-    value = np.array([_value(reading) for reading in readings], dtype=np.float64)
-    radius_m = _radii(world, anchor, is_range, value)
-    return Heard(time_ns, anchor, is_range, value, dict(zip(identity, radius_m.tolist(), strict=True)))
 
 
 def _value(reading: RssiReading | RangeReading) -> float:

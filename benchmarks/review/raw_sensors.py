@@ -1,4 +1,4 @@
-"""What the motion sensors said, before anybody made sense of it: speeds and turn rates over time."""
+"""Raw data of the motion sensors: speeds and turn rates over time, and events of the devices."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ def raw_series(world: World, measurements: Sequence[Measurement]) -> Series:
 
 def _by_sensor(measurements: Sequence[Measurement], kind: type[Kind]) -> dict[str, list[Kind]]:
     """Those of one kind by sensor, in time order, each stamp once."""
-    found: dict[str, dict[int, Kind]] = defaultdict(dict)
+    by_sensor: dict[str, dict[int, Kind]] = defaultdict(dict)
     for measurement in measurements:
         if isinstance(measurement, kind):
-            found[measurement.sensor][measurement.time_ns] = measurement
-    return {sensor: [own[time_ns] for time_ns in sorted(own)] for sensor, own in sorted(found.items())}
+            by_sensor[measurement.sensor][measurement.time_ns] = measurement
+    return {sensor: [own[time_ns] for time_ns in sorted(own)] for sensor, own in sorted(by_sensor.items())}
 
 
 def _stamps(measurements: Sequence[Measurement]) -> Stamps:
@@ -83,7 +83,7 @@ LEVELS = {Level.OK: "INFO", Level.WARN: "WARN", Level.ERROR: "ERROR"}
 
 
 def worth_a_line(run: Run) -> Sequence[Diagnostic]:
-    """Diagnostics that are no routine: what is told each second, or beside each scan, is left out."""
+    """Diagnostics that are no routine: those that come each second, or beside each scan, are left out."""
     return [r for r in run.diagnostics if r.text == OPENED or (r.level is not Level.OK and r.text != STATUS)]
 
 

@@ -32,7 +32,7 @@ PREFIX, SCENE = "fusion-review-", "review.rrd"
 
 
 class Review(NamedTuple):
-    """What a review left behind: its Rerun files, to be opened together, and the worst moments of each estimator."""
+    """Results of a review: its Rerun files, to be opened together, and the worst moments of each estimator."""
 
     files: list[Path]
     moments: list[Moment]
@@ -51,10 +51,10 @@ def review(
     reject_s: Sequence[float] = (),
     seed: int = 0,
 ) -> Review:
-    """Run the estimators (None: all available), with the parameters ``settings``, over ``run`` (a log of ours, or what
-    was read from anything else) and draw them: into
-    ``save`` (one file ``OUT.rrd``, or a folder of layers), into the picture ``png``, or, given neither and no
-    ``worst``, in the viewer. The time cursor of picture and viewer stands ``at_s`` after the start (None: at the end).
+    """Run the estimators (None: all available), with the parameters ``settings``, over ``run`` (a log of ours, or
+    the run that was read from anything else) and draw them: into ``save`` (one file ``OUT.rrd``, or a folder of
+    layers), into the picture ``png``, or, given neither and no ``worst``, in the viewer. The time cursor of picture and
+    viewer stands ``at_s`` after the start (None: at the end).
 
     ``worst``: how many of the worst moments of each estimator are looked for. ``without`` an anchor, ``reject_s`` the
     radio measurement nearest to a time: each adds what every estimator would have made of that, as a counterfactual.
@@ -75,8 +75,9 @@ def review(
     recorded = run if isinstance(run, Run) else own_log(run)
     require_settings(settings, names, recorded.world)
     if worst and recorded.truth is None:
-        told = f"{recorded.path} holds no ground truth, so no moment is worse than another; leave it out"
-        raise ParameterError(f"--worst: {told}")
+        raise ParameterError(
+            f"--worst: {recorded.path} holds no ground truth, so no moment is worse than another; leave it out"
+        )
     if at_s is not None:
         require_within(recorded, at_s, "--at")
     chosen = {name: settings.get(name, {}) for name in names}
@@ -95,9 +96,9 @@ def review(
 
 def _worst(run: Run, reviewed: Sequence[Reviewed], count: int) -> list[Moment]:
     """Of every estimator, the best first; counterfactuals are compared, not searched."""
-    start_ns, drawn, found = Frame.around(run).start_ns, drawings(run, reviewed), []
+    start_ns, drawn, moments = Frame.around(run).start_ns, drawings(run, reviewed), []
     for drawing in drawn:
         if not drawing.is_counterfactual:
             others = [other for other in drawn if other.reviewed.counterfactual_of == drawing.name]
-            found += worst_moments(run, drawing, start_ns, count, others)
-    return found
+            moments += worst_moments(run, drawing, start_ns, count, others)
+    return moments

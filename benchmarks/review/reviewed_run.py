@@ -13,7 +13,7 @@ from logs.run import Run
 
 
 def own_log(path: Path) -> Run:
-    """The run in a log of ours; raises `LogError`, which says what a bag needs, for anything else."""
+    """The run in a log of ours; raises `LogError`, with what a bag needs, for anything else."""
     if path.is_dir() or (path.is_file() and not holds_run(path)):
         raise LogError(f"{path}: is no log of ours; for a ROS 2 bag give --world WORLD.toml, and --topic for its truth")
     require_log(path)
@@ -21,7 +21,7 @@ def own_log(path: Path) -> Run:
 
 
 def remarks(run: Run) -> Iterator[str]:
-    """What is wrong with the run, or missing, for a reader who sees only what there is."""
+    """Warnings of the run, and a sentence for each kind of data that it lacks."""
     yield from run.warnings
     if run.truth is None:
         yield f"{run.path}: holds no ground truth, so nothing shows how far anyone erred"

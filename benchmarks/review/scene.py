@@ -24,7 +24,7 @@ from benchmarks.review.folding import Reviewed
 from benchmarks.review.frame import Frame
 from benchmarks.review.listing import line
 from benchmarks.review.moments import worst_moments
-from benchmarks.review.radio_circles import heard
+from benchmarks.review.radio_circles import ReadingColumns
 from benchmarks.review.viewer import require_rerun
 from benchmarks.runner.leaderboard import COST_COLUMN, leaderboard
 from fusion.output.files import require_place, write
@@ -32,7 +32,7 @@ from fusion.output.tables import as_markdown
 from logs.run import Run
 
 AGES = (column("age_p95", "age"), column("dropouts", "gaps"))
-"""How old the newest answer was at 95 % of the instants [s], and how often there was none for a while."""
+"""Age of the newest answer at 95 % of the instants [s], and the number of gaps without one."""
 APPLICATION = "fusion"
 SUFFIX = ".rrd"
 
@@ -46,7 +46,8 @@ def write_scene(output: Path, run: Run, reviewed: Sequence[Reviewed]) -> list[Pa
     """
     rr = require_rerun()
     base, layers = files(output, [one.name for one in reviewed])
-    frame, drawn, readings = Frame.around(run), drawings(run, reviewed), heard(run.world, run.measurements)
+    frame, drawn = Frame.around(run), drawings(run, reviewed)
+    readings = ReadingColumns.of_run(run.world, run.measurements)
     axes, legend = _axes(drawn), frame.legend(1 + len(drawn))
     identity = f"{run.name} {run.world.hash[:12]}"
     with _recording(base, identity, blueprint(frame, run, drawn)) as recording:
@@ -100,8 +101,8 @@ def _axes(drawn: Sequence[Drawing]) -> CdfAxes | None:
 def _worst(run: Run, drawn: Sequence[Drawing], start_ns: int) -> str:
     """The worst moment of each estimator that is shown, as a list; empty where nothing is judged."""
     shown = [drawing for drawing in drawn if drawing.shown and not drawing.is_counterfactual]
-    found = [moment for drawing in shown for moment in worst_moments(run, drawing, start_ns, 1)]
-    return "".join(["\nWorst moments\n\n", *(f"- {line(moment)}\n" for moment in found)]) if found else ""
+    moments = [moment for drawing in shown for moment in worst_moments(run, drawing, start_ns, 1)]
+    return "".join(["\nWorst moments\n\n", *(f"- {line(moment)}\n" for moment in moments)]) if moments else ""
 
 
 def markdown(drawn: Sequence[Drawing]) -> str:

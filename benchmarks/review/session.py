@@ -79,7 +79,7 @@ class Session(NamedTuple):
         return max((int(line.end or 0) for line in lines if line.name == TIMELINE), default=0)
 
     def screenshot(self) -> bytes:
-        """What it shows, as a PNG file."""
+        """Its picture, as a PNG file."""
         return self.viewer.ask("a picture", self._picture)
 
     def _picture(self) -> bytes:

@@ -35,7 +35,7 @@ Answer = TypeVar("Answer")
 
 
 class Patience(NamedTuple):
-    """How long a viewer may take on a slow, loaded machine [s]."""
+    """Time limits of a viewer on a slow, loaded machine [s]."""
 
     answer_s: float = 90.0
     """For an answer; for starting or loading, too, however often it is asked meanwhile."""
@@ -70,7 +70,7 @@ class Viewer(NamedTuple):
     errors: IO[bytes]
     port: int
     remedy: str = NO_VIEWER
-    """What to do where it ends by itself: the start of that error's message."""
+    """The remedy where it ends by itself: the start of that error's message."""
     patience: Patience = Patience()
 
     def ask(self, wanted: str, question: Callable[[], Answer]) -> Answer:

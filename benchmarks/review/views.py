@@ -14,7 +14,7 @@ from fusion.output.colours import GROUND
 from logs.run import Run
 
 TRAIL_S = 10.0
-"""How far back the strong part of a track goes."""
+"""Length of the strong part of a track, back from the cursor."""
 
 
 def tabs(views: Sequence[Any]) -> Any:  # noqa: ANN401 - Rerun's own values, here and below
@@ -45,7 +45,7 @@ def map_view(frame: Frame, run: Run, drawn: Sequence[Drawing]) -> Any:  # noqa: 
 
 
 def _map_title(run: Run, drawn: Sequence[Drawing]) -> str:
-    """What is drawn, and whose judgement the circles are coloured by."""
+    """The title of the map, with the estimator whose decisions colour the circles."""
     judge = next((drawing.name for drawing in drawn if drawing.gates), None)
     circles = "" if judge is None else f", circles: readings, yellow where {judge} took them"
     return f"{run.name}: tracks (m, y up), 95 % ellipses{circles}"
@@ -155,7 +155,7 @@ def table_view(drawn: Sequence[Drawing]) -> Any:  # noqa: ANN401
 
 
 def event_view(name: str) -> Any:  # noqa: ANN401
-    """What happened to one estimator, or to the devices, line by line."""
+    """Events of one estimator, or of the devices, line by line."""
     import rerun as rr
     import rerun.blueprint as rrb
 

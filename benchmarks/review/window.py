@@ -18,7 +18,7 @@ from benchmarks.review.viewer import LOCAL, free_port, start
 
 
 def has_display() -> bool:
-    """Whether a window could be opened."""
+    """True where a window can be opened."""
     return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 

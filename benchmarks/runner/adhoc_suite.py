@@ -17,7 +17,7 @@ from fusion import LogError
 from fusion.cli.options import Settings, require_estimators, require_settings
 from fusion.output.files import write_json
 from fusion.output.progress import Progress
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 from logs.reader import read_world
 
 
@@ -79,7 +79,7 @@ def adhoc_suite(runs: Sequence[Path], estimators: Sequence[str], settings: Setti
     )
 
 
-def tables(results: Sequence[Result]) -> list[Sheet]:
+def tables(results: Sequence[Result]) -> list[Table]:
     """A leaderboard for each run, and one over those with truth where these are several."""
     each = by_run(results)
     made = []

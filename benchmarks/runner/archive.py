@@ -1,4 +1,4 @@
-"""What an estimator said in a run, as bytes of a store: small, and quick to score again."""
+"""Track and fates of an estimator in a run, as bytes of a store: small, and quick to score again."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def to_bytes(track: Track, fates: FateColumns) -> bytes:
 
 
 def from_bytes(content: bytes) -> tuple[Track, FateColumns]:
-    """What `to_bytes` has written. Raises `ValueError`, `KeyError`, `EOFError` or `BadZipFile` for anything else."""
+    """The reverse of `to_bytes`. Raises `ValueError`, `KeyError`, `EOFError` or `BadZipFile` for anything else."""
     with np.load(BytesIO(content), allow_pickle=False) as stored:
         received_ns, time_ns, fix_ns = stored["track_ns"]
         valid, heading_known = stored["track_flags"]

@@ -21,15 +21,15 @@ from fusion import FusionError
 
 RETRIES = 1
 PATIENCE_S = 10.0
-"""How long a scheduler may take to answer."""
+"""Time for a scheduler to answer [s]."""
 
 
 def execute_on_dask(cells: Sequence[Cell], store: Store, address: str, limits: Limits) -> Iterator[Done]:
     """Carry out ``cells`` on the cluster whose scheduler is at ``address``; each is answered as it is done.
 
     A cell that dies or breaks ``limits`` costs itself alone. A Dask worker that dies gives its cells back; those that
-    Dask gives up since too many died are no results: they stay missing, which a `FusionError` tells when the rest is
-    done. Raises that also without the package, and when nobody answers (any more).
+    Dask gives up since too many died are no results: they stay missing, which a `FusionError` reports when the rest
+    is done. Raises that also without the package, and when nobody answers (any more).
     """
     dask = _distributed()
     with _connect(dask, address) as client, _cell_processes(client, limits) as plugin:

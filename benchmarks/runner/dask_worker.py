@@ -1,4 +1,4 @@
-"""What a Dask worker does with a cell: the same as a run on one machine, in a process that the suite's limits hold for.
+"""Cells on a Dask worker: carried out as on one machine, in a process that the suite's limits hold for.
 
 A cell that hangs, crashes or eats memory so costs its own process alone, and the Dask worker takes the next one. Needs
 the package of Dask; `benchmarks.runner.dask_cluster` imports this where that is there.
@@ -19,7 +19,7 @@ from benchmarks.runner.workers import Limits, WorkerPool
 
 Task = tuple[Cell, Path]
 IDLE_S = 60.0
-"""A process without a cell for that long ends: its run may have been killed and nobody will say that it is over."""
+"""A process without a cell for that long ends: its run may have been killed without dismissing it."""
 
 
 class CellProcesses(WorkerPlugin):

@@ -60,12 +60,7 @@ def run_moments(run: Run) -> tuple[Moment, ...]:
 
 
 def run_estimator(
-    run: Run,
-    estimator: str,
-    options: Mapping[str, object] | None = None,
-    seed: int = 0,
-    *,
-    watch: Watch | None = None,
+    run: Run, estimator: str, options: Mapping[str, object] | None = None, seed: int = 0, *, watch: Watch | None = None
 ) -> EstimatorRun:
     """Fold the measurements of ``run`` through the estimator of that name. Never raises for what a plug-in does."""
     updates: list[Update] = []

@@ -156,7 +156,7 @@ def _score(cell: Cell, store: Store, reference: Reference, made: dict[str, Any])
 
 
 def _finite(value: float) -> float | str | None:
-    """JSON knows neither infinity nor NaN; here infinity means "most is lost", NaN "nothing to say"."""
+    """JSON knows neither infinity nor NaN; here infinity means "most is lost", NaN "undefined"."""
     if math.isnan(value):
         return None
     return "inf" if math.isinf(value) else value

@@ -13,7 +13,7 @@ from benchmarks.runner.results import Result, flat, record
 from benchmarks.runner.scoring import ALIVE
 from benchmarks.runner.suite import Suite
 from fusion.output.files import write, write_json
-from fusion.output.tables import Sheet, as_markdown
+from fusion.output.tables import Table, as_markdown
 
 LATEX_SPECIAL = {letter: f"\\{letter}" for letter in "_%&#${}"} | {
     "\\": r"\textbackslash{}",
@@ -36,12 +36,12 @@ def as_csv(results: Sequence[Result]) -> bytes:
     return text.getvalue().encode()
 
 
-def as_latex(sheet: Sheet) -> bytes:
-    """A ``tabular`` of the sheet (booktabs)."""
-    columns = "l" + "r" * (len(sheet.head) - 1)
-    rows = [" & ".join(map(_latex, row)) + r" \\" for row in (sheet.head, *sheet.rows)]
+def as_latex(table: Table) -> bytes:
+    """A ``tabular`` of the table (booktabs)."""
+    columns = "l" + "r" * (len(table.head) - 1)
+    rows = [" & ".join(map(_latex, row)) + r" \\" for row in (table.head, *table.rows)]
     body = "\n".join([rows[0], r"\midrule", *rows[1:]])
-    head = f"% {sheet.title}\n\\begin{{tabular}}{{{columns}}}\n\\toprule\n"
+    head = f"% {table.title}\n\\begin{{tabular}}{{{columns}}}\n\\toprule\n"
     return f"{head}{body}\n\\bottomrule\n\\end{{tabular}}\n".encode()
 
 
@@ -66,7 +66,7 @@ def as_junit(suite: Suite, results: Sequence[Result]) -> bytes:
 
 
 def _printable(text: str) -> str:
-    """XML has no control characters, and an estimator may say anything."""
+    """XML has no control characters, and the error of an estimator may hold any."""
     return "".join(letter if letter.isprintable() or letter == "\n" else "?" for letter in text)
 
 

@@ -14,13 +14,7 @@ from pathlib import Path
 
 HOST = ("fusion", "logs")
 """The rooms that every result rests on: the host of the estimators, and the reader of the runs with their prior."""
-DECIDES_NOTHING = (
-    "fusion.conformance",
-    "fusion.cli",
-    "fusion.output",
-    "logs.cli",
-    "sensors.cli",
-)
+DECIDES_NOTHING = ("fusion.conformance", "fusion.cli", "fusion.output", "logs.cli", "sensors.cli")
 """Packages of ours whose code decides no number."""
 ROOM_OF_FAULTS = "benchmarks.faults"
 """Of `benchmarks`, the one package that an estimate rests on."""
@@ -41,11 +35,11 @@ def fingerprint(module: str) -> str:
 
 def _sources(name: str) -> list[tuple[str, Path]]:
     """The files of a package or module, each with its place in it; those of `DECIDES_NOTHING` are left out."""
-    found = import_module(name)
-    if not hasattr(found, "__path__"):
-        return [(name, Path(str(found.__file__)))]
+    loaded = import_module(name)
+    if not hasattr(loaded, "__path__"):
+        return [(name, Path(str(loaded.__file__)))]
     left_out = tuple(f"{one.replace('.', '/')}/" for one in DECIDES_NOTHING)
     # A package without __init__.py has no file of its own, and may have several folders.
-    files = [(folder, path) for folder in found.__path__ for path in Path(folder).rglob("*")]
+    files = [(folder, path) for folder in loaded.__path__ for path in Path(folder).rglob("*")]
     places = [(f"{name.replace('.', '/')}/{path.relative_to(folder).as_posix()}", path) for folder, path in files]
     return sorted(one for one in places if one[0].endswith(SUFFIXES) and not one[0].startswith(left_out))

@@ -23,13 +23,13 @@ from fusion.output.html import data_of
 
 @unique
 class Outcome(IntEnum):
-    """What a gate says, as its exit code."""
+    """Outcome of a gate, of `bench verify` and of `bench replay`, as their exit code."""
 
     PASS = 0
     REGRESSION = 1
     USAGE = 2
     NOT_MEASURED = 3
-    CANNOT_TELL = 4
+    INCONCLUSIVE = 4
     NOT_DETERMINISTIC = 5
 
 
@@ -38,7 +38,7 @@ GRAVEST_FIRST = (
     Outcome.NOT_MEASURED,
     Outcome.NOT_DETERMINISTIC,
     Outcome.REGRESSION,
-    Outcome.CANNOT_TELL,
+    Outcome.INCONCLUSIVE,
     Outcome.PASS,
 )
 
@@ -63,7 +63,7 @@ def judge(results: Sequence[Result], gate: Gate, baseline: Baseline | None) -> l
 
 
 def _floor(name: str, own: Sequence[Result], metric: str, least: float) -> Finding:
-    """A lost cell is below every floor; of one that has nothing to say nobody knows."""
+    """A lost cell is below every floor; one without a value is inconclusive."""
     values = [result.metrics.get(metric, math.nan) for result in own]
     known = [
         -math.inf if math.isnan(value) and _is_lost(result) else value
@@ -75,7 +75,7 @@ def _floor(name: str, own: Sequence[Result], metric: str, least: float) -> Findi
     if worst < least:
         return Finding(Outcome.REGRESSION, text)
     if silent:
-        return Finding(Outcome.CANNOT_TELL, f"{name}: {metric} has nothing to say in {silent} of {len(own)} cells")
+        return Finding(Outcome.INCONCLUSIVE, f"{name}: {metric} is undefined in {silent} of {len(own)} cells")
     return Finding(Outcome.PASS, text)
 
 
@@ -84,11 +84,11 @@ def _is_lost(result: Result) -> bool:
 
 
 def _inside(name: str, own: Sequence[Result], metric: str) -> Finding:
-    """Whether every cell lies in its own chi-square band, which counts how correlated its errors are in time."""
+    """Pass where every cell lies in its own chi-square band, which counts how correlated its errors are in time."""
     keys = (metric, f"{metric}_band_low", f"{metric}_band_high")
     value, low, high = np.array([[result.metrics.get(key, math.nan) for key in keys] for result in own]).T
     if not np.isfinite([value, low, high]).all():
-        return Finding(Outcome.CANNOT_TELL, f"{name}: {metric} has no band in every cell; it claims no covariance, say")
+        return Finding(Outcome.INCONCLUSIVE, f"{name}: {metric} has no band in every cell; does it claim a covariance?")
     outside = np.flatnonzero((value < low) | (value > high))
     text = f"{name}: {metric} lies outside its band in {len(outside)} of {len(own)} cells"
     return Finding(Outcome.REGRESSION if len(outside) else Outcome.PASS, text)
@@ -96,10 +96,10 @@ def _inside(name: str, own: Sequence[Result], metric: str) -> Finding:
 
 def _against(name: str, own: Sequence[Result], gate: Gate, before: Sequence[Row] | None) -> list[Finding]:
     if before is None:
-        return [Finding(Outcome.CANNOT_TELL, f"{name}: the baseline does not know it")]
+        return [Finding(Outcome.INCONCLUSIVE, f"{name}: the baseline does not know it")]
     rows = counterparts(own, before)
     if rows is None:
-        return [Finding(Outcome.CANNOT_TELL, f"{name}: the baseline has other runs or seeds")]
+        return [Finding(Outcome.INCONCLUSIVE, f"{name}: the baseline has other runs or seeds")]
     findings = [
         Finding(Outcome.REGRESSION, f"{result.cell}: {result.status}, and was not before")
         for result, row in zip(own, rows, strict=True)
@@ -127,7 +127,7 @@ def _ratio(name: str, metric: str, margin: float, now: Floats, before: Floats) -
         return Finding(Outcome.REGRESSION, f"{name}: {metric} {lost}")
     if low > 1.0 + margin:
         return Finding(Outcome.REGRESSION, text)
-    return Finding(Outcome.PASS if high <= 1.0 + margin else Outcome.CANNOT_TELL, text)
+    return Finding(Outcome.PASS if high <= 1.0 + margin else Outcome.INCONCLUSIVE, text)
 
 
 Row = Mapping[str, Any]
@@ -138,7 +138,7 @@ Place = tuple[str, int]
 
 
 def read_baseline(path: Path) -> Baseline:
-    """What `fusion bench export --json`, or `report --html`, has written, by estimator; raises `SuiteError`."""
+    """Results in the file of `fusion bench export --json`, or `report --html`, by estimator; raises `SuiteError`."""
     try:
         text = path.read_text(encoding="utf-8")
         stored = data_of(text) if path.suffix == ".html" else json.loads(text)
@@ -164,7 +164,7 @@ def _by_estimator(rows: Sequence[Row]) -> Baseline:
 
 
 def counterparts(own: Sequence[Result], before: Sequence[Row]) -> list[Row] | None:
-    """The row of each of ``own``, told by run and seed; None when one has none, or a run for testing is gone."""
+    """The row of each of ``own``, by run and seed; None when one has none, or a run for testing is gone."""
     rows = {(row["run"], row["seed"]): row for row in before}
     places = [(result.cell.run.id, result.cell.seed) for result in own]
     asked = {place for place, row in rows.items() if row.get("split", TEST) == TEST and row["status"] != "unscored"}
@@ -174,7 +174,7 @@ def counterparts(own: Sequence[Result], before: Sequence[Row]) -> list[Row] | No
 
 
 def scores(rows: Sequence[Row], metric: str) -> Floats:
-    """What each row has of a metric, (n,), infinite where it has none; raises `SuiteError` for what is no number."""
+    """A metric of each row, (n,), infinite where it has none; raises `SuiteError` for a value that is no number."""
     return np.array([_score(row, metric) for row in rows])
 
 

@@ -12,7 +12,7 @@ from benchmarks.runner.results import Result, by_estimator, median_metrics
 from benchmarks.runner.scoring import ALIVE, STATUSES
 from benchmarks.runner.suite import CLEAN
 from benchmarks.statistics.verdict import Comparison, Verdict
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 
 WORST = "pos_rmse_worst"
 """The greatest RMSE of any cell, infinite where one was lost."""
@@ -57,7 +57,7 @@ def _entry(name: str, own: Sequence[Result]) -> Entry:
     return Entry(name, tuple(one.status for one in own), metrics)
 
 
-def leaderboard(title: str, rows: Sequence[Entry], columns: Sequence[Column] | None = None) -> Sheet:
+def leaderboard(title: str, rows: Sequence[Entry], columns: Sequence[Column] | None = None) -> Table:
     """The estimators, the best first; ``columns`` None: those that they have."""
     shown = columns_of(rows) if columns is None else columns
     several = any(len(row.statuses) > 1 for row in rows)
@@ -65,7 +65,7 @@ def leaderboard(title: str, rows: Sequence[Entry], columns: Sequence[Column] | N
     head = (corner, *(["cells ok"] if several else []), *(one.title for one in shown))
     ranking = sorted(rows, key=rank)
     lines = [(*_name(row, several), *(one.text(row.metrics) for one in shown)) for row in ranking]
-    return Sheet(title, head, tuple(lines))
+    return Table(title, head, tuple(lines))
 
 
 def columns_of(rows: Sequence[Entry]) -> list[Column]:
@@ -95,12 +95,12 @@ def _name(row: Entry, several: bool) -> tuple[str, ...]:
     return (f"{row.name} ({row.statuses[0]})" if row.lost else row.name,)
 
 
-def suite_leaderboard(results: Sequence[Result], fault: str = CLEAN) -> Sheet:
+def suite_leaderboard(results: Sequence[Result], fault: str = CLEAN) -> Table:
     """The leaderboard of a suite under one fault."""
     return leaderboard(f"{fault}: medians over cells", entries(results, fault))
 
 
-def pair_table(judged: Comparison) -> Sheet:
+def pair_table(judged: Comparison) -> Table:
     """Every pair as one row."""
     rows = []
     for verdict in judged.verdicts:
@@ -110,9 +110,9 @@ def pair_table(judged: Comparison) -> Sheet:
             f"{verdict.holm_p:.2g}",
             f"{verdict.signed_rank.p:.2g}",
         )
-        rows.append((f"{verdict.first} / {verdict.second}", *numbers, verdict.winner or "cannot tell"))
+        rows.append((f"{verdict.first} / {verdict.second}", *numbers, verdict.winner or "inconclusive"))
     head = ("pair", "ratio [95 %]", "runs compared", "p, Holm", "p, signed ranks", "better")
-    return Sheet(f"Pairs on {judged.metric}", head, tuple(rows))
+    return Table(f"Pairs on {judged.metric}", head, tuple(rows))
 
 
 def _ratio(verdict: Verdict) -> str:

@@ -1,4 +1,4 @@
-"""The cells of a suite, and the keys that say what each result depends on."""
+"""The cells of a suite, and the keys of their results, from all that these depend on."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from fusion.plugins import parameters
 
 
 class Cell(NamedTuple):
-    """One run, one estimator, one set of faults, one seed: a pure function of what its spec says, and its keys."""
+    """One run, one estimator, one set of faults, one seed: a pure function of its spec, and its keys."""
 
     run: RunSource
     estimator: EstimatorSpec
@@ -82,7 +82,7 @@ def _cells(
 
 
 def estimator_identity(estimator: EstimatorSpec) -> dict[str, object]:
-    """What an estimate depends on beside the run: code, parameters (those not given at their defaults), numerics."""
+    """The part of an estimate's key beside the run: code, parameters (those not given at their defaults), numerics."""
     made = fusion.load(estimator.use)
     known = {name: parameter.default for name, parameter in parameters(made).items()}
     for key in estimator.params:
@@ -102,7 +102,7 @@ def estimator_identity(estimator: EstimatorSpec) -> dict[str, object]:
 def run_identity(
     suite: Suite, run: RunSource, fault: FaultSet, content: Content, code: Sequence[str]
 ) -> dict[str, object]:
-    """What an estimate depends on of the run. Faults are drawn by suite seed and run, never by estimator."""
+    """The part of an estimate's key from the run. Faults are drawn by suite seed and run, never by estimator."""
     if fault.id == CLEAN:
         return {"measured": content.measured}
     drawn = {
@@ -126,7 +126,7 @@ def fault_code(faults: FaultSet) -> list[str]:
 
 
 class Missing(NamedTuple):
-    """What of a plan is still to be done."""
+    """Cells of a plan that are still to be carried out."""
 
     estimates: list[Cell]
     scores: list[Cell]
@@ -141,7 +141,7 @@ def missing(cells: Sequence[Cell], store: Store) -> Missing:
 
 
 def has_estimate(cell: Cell, store: Store) -> bool:
-    """Whether its estimate is there, for good: one that broke a limit is worth nothing once the limit is greater."""
+    """True where its estimate is there, for good: one that broke a limit is void once the limit is greater."""
     if not store.has("estimates", cell.estimate_key):
         return False
     broken = store.read_json("estimates", cell.estimate_key, "result.json").get("broken_limit")
@@ -149,5 +149,5 @@ def has_estimate(cell: Cell, store: Store) -> bool:
 
 
 def shard(cells: Sequence[Cell], number: int, count: int) -> list[Cell]:
-    """The part of ``cells`` of shard ``number`` of ``count``, from 1: told by the keys, so that all machines agree."""
+    """The ``cells`` of shard ``number`` of ``count``, from 1: chosen by the keys, so that all machines agree."""
     return [one for one in cells if int(one.estimate_key[:16], 16) % count == number - 1]

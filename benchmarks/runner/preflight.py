@@ -1,4 +1,4 @@
-"""What of a plan cannot be carried out, found before any of it is: a cell that fails for it would say so much later."""
+"""Checks before a plan is carried out: a cell that fails for such a reason would report it much later."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def _refuse_parameters(cells: Sequence[Cell]) -> None:
     one_each = {cell.run.id: cell for cell in cells}
     worlds = {run: open_world(cell.run, cell.folder) for run, cell in one_each.items()}
     asked = {(cell.estimator.id, worlds[cell.run.id].hash): cell for cell in cells}.values()
-    told = {cell.estimator.id: _refusal(cell.estimator, worlds[cell.run.id]) for cell in asked}
-    refused = {name: why for name, why in told.items() if why is not None}
+    refusals = {cell.estimator.id: _refusal(cell.estimator, worlds[cell.run.id]) for cell in asked}
+    refused = {name: why for name, why in refusals.items() if why is not None}
     if refused:
         first, *others = refused
         more = f"; so are refused {', '.join(others)}" if others else ""
@@ -35,8 +35,8 @@ def _refuse_parameters(cells: Sequence[Cell]) -> None:
 
 
 def _refusal(estimator: EstimatorSpec, world: World) -> str | None:
-    """Why the parameters are refused, None when they are not. An estimator that cannot be had in that world whatever
-    its parameters is not refused: that is a result, of cells that are lost.
+    """Reason why the parameters are refused, None when they are not. An estimator that cannot be had in that world
+    whatever its parameters is not refused: that is a result, of cells that are lost.
     """
     try:
         fusion.build(estimator.use, world, estimator.params)

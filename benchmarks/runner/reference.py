@@ -30,8 +30,9 @@ class Reference(NamedTuple):
     begin_ns: int
 
     @classmethod
+    @lru_cache(maxsize=KEPT_RUNS)
     def of(cls, run: Run) -> Reference:
-        """The reference of a run by the usual rules."""
+        """The reference of a run by the usual rules: taken once, whatever the number of estimators."""
         truth = run.truth or TruthTrack.from_truths([])
         return cls(truth, evaluation_instants(truth), begin_ns(run.measurements))
 

@@ -22,10 +22,24 @@ from logs.truth import TruthTrack
 from logs.writer import RunWriter
 
 
-def write_replay(run: Run, estimator_run: EstimatorRun, output: Path, metadata: Mapping[str, str]) -> None:
-    """A log of the messages in the order they came in, each followed by what the estimator said to it; from where it
-    crashed on, of the messages alone.
+def write_replay(
+    run: Run,
+    estimator_run: EstimatorRun,
+    output: Path,
+    *,
+    options: Mapping[str, object] | None = None,
+    seed: int = 0,
+    **metadata: str,
+) -> None:
+    """A log of the messages in the order they came in, each followed by its update; from where the estimator crashed
+    on, of the messages alone. Its ``metadata`` are those of the run with the certificate of the replay.
     """
+    certificate = {"digest": estimator_run.digest, "estimator": estimator_run.name, "seed": str(seed)}
+    certificate["parameters"] = json.dumps(dict(options or {}), sort_keys=True)
+    _write(run, estimator_run, output, {**run.metadata, **certificate, **metadata})
+
+
+def _write(run: Run, estimator_run: EstimatorRun, output: Path, metadata: Mapping[str, str]) -> None:
     truths = _truths(run.truth) if run.truth is not None else []
     now_ns, answered = 0, 0
     with RunWriter(output, run.world, name=run.name, prior=run.prior, metadata=metadata) as writer:
@@ -77,17 +91,10 @@ def _found(what: str, wanted: str, known: Mapping[str, Item]) -> tuple[Item]:
 
 
 def replay_cell(cell: Cell, output: Path) -> str:
-    """Fold the run of ``cell``, faults and all, through its estimator; write what was measured and said as a log, and
+    """Fold the run of ``cell``, faults and all, through its estimator; write measurements and updates as a log, and
     answer the digest: "" where the estimator crashed, which the log then shows up to that moment.
     """
     run = faulty_run(cell)
     estimator_run = fold(cell, run)
-    about = {
-        "estimator": cell.estimator.use,
-        "seed": str(cell.seed),
-        "fault": cell.fault.id,
-        "digest": estimator_run.digest,
-    }
-    parameters = json.dumps(dict(cell.estimator.params), sort_keys=True)
-    write_replay(run, estimator_run, output, {**run.metadata, **about, "parameters": parameters})
+    write_replay(run, estimator_run, output, options=cell.estimator.params, seed=cell.seed, fault=cell.fault.id)
     return estimator_run.digest

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import platform
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,13 +17,13 @@ from benchmarks.runner.plan import Cell
 from benchmarks.runner.store import Store
 from benchmarks.runner.suite import CLEAN, TEST, Suite
 from benchmarks.statistics.verdict import Comparison, compare
-from fusion import ParameterError, SuiteError
+from fusion import ParameterError
 from fusion.arrays import Floats
 from fusion.errors import did_you_mean
 
 
 class Result(NamedTuple):
-    """One cell's score: infinite and NaN metrics are what `benchmarks.metrics.score` says they are. ``error``: why it
+    """One cell's score: infinite and NaN metrics are as in `benchmarks.metrics.score`. ``error``: why it
     was lost. ``worst_at_s``: when its position error was greatest, since the start of the run; None where there is no
     error, or no score. ``facts``: what became of the run and its readings. ``cpu_s``: the processor time of the fold,
     where that took place now.
@@ -50,12 +50,12 @@ class Result(NamedTuple):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence for each thing that is wrong with the run."""
+        """Warnings of the run, a sentence each."""
         return tuple(self.facts["warnings"])
 
     @property
     def has_truth(self) -> bool:
-        """Whether there was anything to score it against."""
+        """True where there was a truth to score it against."""
         return "n" in self.metrics
 
     @property
@@ -67,14 +67,14 @@ class Result(NamedTuple):
 
 def read_results(cells: Iterable[Cell], store: Store) -> list[Result]:
     """Of the cells that have a score; those that have none are left out."""
-    found = []
+    results = []
     for cell in cells:
         if store.has("scores", cell.score_key):
             scored = store.read_json("scores", cell.score_key, "result.json")
             made = store.read_json("estimates", cell.estimate_key, "result.json")
             ended = (scored["status"], scored["error"], made["digest"])
-            found.append(Result(cell, *ended, read_metrics(scored), made, scored["worst_at_s"]))
-    return found
+            results.append(Result(cell, *ended, read_metrics(scored), made, scored["worst_at_s"]))
+    return results
 
 
 def partly_headed(result: Result) -> str:
@@ -86,12 +86,12 @@ def partly_headed(result: Result) -> str:
 
 
 def warnings(results: Sequence[Result]) -> list[str]:
-    """What is wrong with the runs, a sentence each after the id of the run."""
+    """Warnings of the runs, a sentence each after the id of the run."""
     return list(dict.fromkeys(f"{one.run}: {warning}" for one in results for warning in one.warnings))
 
 
 def require_metric(metric: str, results: Sequence[Result]) -> None:
-    """Raises `ParameterError` for a metric that no cell has; where no cell has any, nothing can be said."""
+    """Raises `ParameterError` for a metric that no cell has; where no cell has any, all pass."""
     known = {name for result in results for name in result.metrics}
     if known and metric not in known:
         raise ParameterError(f"the suite has no metric {metric!r}; {did_you_mean(metric, sorted(known))}")
@@ -124,7 +124,7 @@ def by_run(results: Sequence[Result]) -> dict[str, list[Result]]:
 
 def median_metrics(results: Sequence[Result]) -> dict[str, float]:
     """The median over cells of every metric. A lost cell is infinite in the quantiles, so it cannot flatter; where a
-    metric has nothing to say (NaN) the cell does not count.
+    metric is undefined (NaN) the cell does not count.
     """
     names = {name for result in results for name in result.metrics}
     columns = {name: np.array([result.metrics.get(name, math.nan) for result in results]) for name in names}
@@ -171,12 +171,3 @@ def detailed(result: Result) -> dict[str, object]:
         "cpu_per_measurement_s": result.cost_s,
         "versions": {"fusion": fusion.__version__, "numpy": np.__version__, "python": platform.python_version()},
     }
-
-
-NOT_MEASURED = 3
-"""Exit code of a verb that found nothing to judge."""
-
-
-def refuse_incomplete(suite: Suite, there: int, wanted: int) -> NoReturn:
-    """A part of a suite is not its result."""
-    raise SuiteError(f"{suite.name}: {there} of {wanted} cells are there; run `fusion bench run` first")

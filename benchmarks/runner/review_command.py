@@ -1,4 +1,4 @@
-"""The command line that opens a review at a moment, for the tables that say where to look."""
+"""The command line that opens a review at a moment, for tables of moments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The runs of a suite, opened once for all the cells that need them, and told apart by their content."""
+"""The runs of a suite, opened once for all the cells that need them, and identified by their content."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ KEPT_RUNS = 2
 
 
 class Content(NamedTuple):
-    """What a run holds, as hashes: what estimators see of it, and the truth they are scored on ("" for none)."""
+    """Hashes of a run: of all that estimators get of it, and of the truth they are scored on ("" for none)."""
 
     measured: str
     truth: str
@@ -59,10 +59,10 @@ State = tuple[tuple[str, int, int, int], ...]
 
 
 def state_of(path: Path) -> State:
-    """What tells that a log, or a file of a bag's folder, has changed: name, size, time [ns] and place on the disk."""
+    """State of a log, or of a bag's files, to detect changes: name, size, time [ns] and place on the disk."""
     files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
-    found = [(file.name, file.stat()) for file in files]
-    return tuple((name, status.st_size, status.st_mtime_ns, status.st_ino) for name, status in found)
+    states = [(file.name, file.stat()) for file in files]
+    return tuple((name, status.st_size, status.st_mtime_ns, status.st_ino) for name, status in states)
 
 
 def open_world(source: RunSource, folder: Path) -> World:
@@ -108,7 +108,7 @@ def _cut(run: Run, end_ns: int) -> Run:
 
 
 def content_of(source: RunSource, folder: Path, store: Store) -> Content:
-    """The content of a run. A log is read for it once; then its size, time and place on the disk tell it again."""
+    """The content of a run. A log is read for it once; then its size, time and place on the disk identify it."""
     if source.scenario is not None:
         return _content_of_scenario(source, folder)
     path = place_of(source, folder)
@@ -128,7 +128,7 @@ def content_of(source: RunSource, folder: Path, store: Store) -> Content:
 
 
 def _content_of_scenario(source: RunSource, folder: Path) -> Content:
-    """A simulated run is what its scenario, its seed and the simulator make of it."""
+    """A simulated run follows from its scenario, its seed and the simulator."""
     text = scenario_text(scenario_of(str(source.scenario), folder))
     made = key_of({"text": text, "seed": source.seed, "duration_s": source.duration_s, "code": fingerprint("sensors")})
     return Content(made, made)

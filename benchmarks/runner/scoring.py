@@ -31,7 +31,7 @@ USUAL = Evaluation()
 
 
 class End(NamedTuple):
-    """How an estimator ended: one of `STATUSES`, and why it was lost."""
+    """End of an estimator: one of `STATUSES`, and the reason of a loss."""
 
     status: str
     error: str | None = None
@@ -54,7 +54,7 @@ class Score:
 
     @property
     def worst_at_ns(self) -> int | None:
-        """When the position error was greatest; None where no error counts."""
+        """Time of the greatest position error; None where no error counts."""
         if self.errors is None or self.status not in ALIVE:
             return None
         error_m = np.where(np.isfinite(self.errors.position), self.errors.position, -1.0)
@@ -79,15 +79,15 @@ def score(
     own = {} if crash or track.flaw else {**innovation_metrics(fates), **nis_metrics(fates)}
     if len(reference.instants) == 0:
         return Score(crash or end_of(track, math.nan), None, {"availability": availability(track), **own})
-    measured, found = _judge(track, reference, rules, faults)
-    end = crash or end_of(track, found["availability"])
+    measured, metrics = _judge(track, reference, rules, faults)
+    end = crash or end_of(track, metrics["availability"])
     if end.status not in ALIVE:
-        found = _left(found, reference, rules, faults)
-    return Score(end, measured, {**found, **own})
+        metrics = _left(metrics, reference, rules, faults)
+    return Score(end, measured, {**metrics, **own})
 
 
 def end_of(track: Track, available: float) -> End:
-    """How an estimator that did not crash ended, from the share of instants with a valid answer; NaN without truth."""
+    """End of an estimator that did not crash, from the share of instants with a valid answer; NaN without truth."""
     if track.flaw:
         return End("diverged", track.flaw)
     if math.isnan(available):
@@ -111,16 +111,16 @@ def _judge(
 
 
 def _left(
-    found: dict[str, float], reference: Reference, rules: Evaluation, faults: Sequence[Fault]
+    metrics: dict[str, float], reference: Reference, rules: Evaluation, faults: Sequence[Fault]
 ) -> dict[str, float]:
     """Metrics that are left of an estimator that was lost: `metrics_of_lost`, and its availability. At the estimate's
     own stamps no metric counts an instant without an answer, so there nothing else is left.
     """
     silent = _metrics(unanswered(reference.instants), reference, faults)
-    left = silent if rules.reading == "interp" else metrics_of_lost(found, silent)
-    return {**left, "availability": found["availability"]}
+    left = silent if rules.reading == "interp" else metrics_of_lost(metrics, silent)
+    return {**left, "availability": metrics["availability"]}
 
 
 def _metrics(measured: Errors, reference: Reference, faults: Sequence[Fault]) -> dict[str, float]:
-    found = all_metrics(measured)
-    return found | fault_metrics(measured, reference.begin_ns, outages(faults)) if faults else found
+    metrics = all_metrics(measured)
+    return metrics | fault_metrics(measured, reference.begin_ns, outages(faults)) if faults else metrics

@@ -41,7 +41,7 @@ class Store:
         return self.folder / kind / key[:2] / key[2:]
 
     def has(self, kind: str, key: str) -> bool:
-        """Whether the entry is there, whole."""
+        """True where the entry is there, whole."""
         return self.place(kind, key).is_dir()
 
     def read(self, kind: str, key: str, name: str) -> bytes:
@@ -60,7 +60,7 @@ class Store:
             raise self.damaged(kind, key, name, error) from error
 
     def damaged(self, kind: str, key: str, name: str, error: Exception) -> FusionError:
-        """What to raise for a file of an entry that cannot be what was written."""
+        """The error for a file of an entry that is not as it was written."""
         path = self.place(kind, key) / name
         return FusionError(f"{path}: is damaged ({error}); delete {path.parent} and run again")
 

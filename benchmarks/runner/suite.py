@@ -13,20 +13,20 @@ from fusion.errors import did_you_mean
 from logs.truth import GAP_S, RATE_HZ
 
 CATALOGUE = "catalogue"
-"""The file beside the built-in suites that tells where recordings come from."""
+"""The file beside the built-in suites that lists the sources of recordings."""
 CLEAN = "clean"
 """The fault that is none; every suite has it."""
 TUNE, TEST = "tune", "test"
-"""What a run is for: parameters are chosen on the first kind and judged on the second."""
+"""Purpose of a run: parameters are chosen on the first kind and judged on the second."""
 READINGS = ("causal", "interp")
-"""How truth and estimate are brought together."""
+"""Ways to match truth and estimate."""
 INCONCLUSIVE = ("fail", "warn")
-"""What a gate makes of "cannot tell"."""
+"""Ways for a gate to treat an inconclusive finding."""
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """When estimates are judged: `benchmarks.metrics.matching`."""
+    """Rules by which estimates are judged: `benchmarks.metrics.matching`."""
 
     hz: float = RATE_HZ
     reading: str = "causal"
@@ -36,7 +36,7 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True)
 class CellLimits:
-    """What one cell may take: wall-clock time [s] and resident memory [MB]."""
+    """Limits of one cell: wall-clock time [s] and resident memory [MB]."""
 
     wall_s: float = 600.0
     rss_mb: float = 4096.0
@@ -44,7 +44,7 @@ class CellLimits:
 
 @dataclass(frozen=True, slots=True)
 class RunSource:
-    """Where a run comes from: a log of ours, a foreign bag with its ``world``, or a simulated ``scenario``."""
+    """Source of a run: a log of ours, a foreign bag with its ``world``, or a simulated ``scenario``."""
 
     id: str
     mcap: str | None = None
@@ -56,7 +56,7 @@ class RunSource:
     duration_s: float | None = None
     split: str = TEST
     catalogue: str | None = None
-    """Where a log that is not there comes from: a set of `benchmarks/suites/catalogue.toml`."""
+    """Source of a log that is not there: a set of `benchmarks/suites/catalogue.toml`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +77,12 @@ class EstimatorSpec:
         """One estimator per point of the grid, which it keeps: what else was tried belongs to a result."""
         if not self.grid:
             return [self]
-        found = []
+        combinations = []
         for values in product(*self.grid.values()):
             chosen = dict(zip(self.grid, values, strict=True))
             suffix = ",".join(f"{key}={value}" for key, value in chosen.items())
-            found.append(replace(self, id=f"{self.id}[{suffix}]", params={**self.params, **chosen}))
-        return found
+            combinations.append(replace(self, id=f"{self.id}[{suffix}]", params={**self.params, **chosen}))
+        return combinations
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +95,8 @@ class FaultSet:
 
 @dataclass(frozen=True, slots=True)
 class Gate:
-    """What `bench gate` demands. ``ratio``: by how much a metric may grow over the baseline; ``floor``: its least
-    value; ``inside``: metrics that must lie in their chi-square band; ``inconclusive``: what "cannot tell" is.
+    """Conditions of `bench gate`. ``ratio``: by how much a metric may grow over the baseline; ``floor``: its least
+    value; ``inside``: metrics that must lie in their chi-square band; ``inconclusive``: how such findings count.
     """
 
     baseline: str | None = None
@@ -127,12 +127,12 @@ class Suite:
 
     @property
     def folder(self) -> Path:
-        """Where its paths begin: beside its file, or here for a suite of the package, whose recordings are yours."""
+        """Folder of its relative paths: its file's; the present one for a suite of the package."""
         return Path.cwd() if self._is_builtin else self.path.parent
 
     @property
     def word(self) -> str:
-        """What names it on a command line, wherever that is typed on this machine."""
+        """Its name on a command line, wherever that is typed on this machine."""
         return self.path.stem if self._is_builtin else str(self.path)
 
     @property

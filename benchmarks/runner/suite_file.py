@@ -54,7 +54,7 @@ class _File:
 
 
 def load_suite(path: Path) -> Suite:
-    """The suite in a TOML file, or a built-in one by name; raises `SuiteError` that says where it is wrong, and
+    """The suite in a TOML file, or a built-in one by name; raises `SuiteError` that names the wrong place, and
     `PluginError` for an optional estimator that is not there for another reason than its package.
     """
     if not path.suffix and not path.exists():
@@ -108,14 +108,14 @@ def _checked(written: _File, path: Path) -> Suite:
 
 
 def _absent(estimators: Sequence[EstimatorSpec]) -> dict[str, NotInstalledError]:
-    """Why the optional ones that are not there are not, by the name they use."""
-    found = {}
+    """The errors of optional estimators that are not there, by the name they use."""
+    absent = {}
     for name in dict.fromkeys(estimator.use for estimator in estimators if estimator.optional):
         try:
             load(name)
         except NotInstalledError as error:
-            found[name] = error
-    return found
+            absent[name] = error
+    return absent
 
 
 def _require_unique(ids: Sequence[str], where: str) -> None:

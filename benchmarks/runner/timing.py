@@ -34,7 +34,7 @@ TimingTask: TypeAlias = tuple[RunSource, Path, EstimatorSpec, int]
 
 
 class Timing(NamedTuple):
-    """What one estimator costs: processor time per measurement [µs], the least of all repeats and their quartiles;
+    """Cost of one estimator: processor time per measurement [µs], the least of all repeats and their quartiles;
     quantiles of the time one measurement takes [µs], in the best repeat; how many seconds of processor time a second
     of the log takes; and the peak memory [MB] of a fresh process that opens the run and filters it once.
     """
@@ -65,8 +65,8 @@ def measure(suite: Suite, repeats: int = REPEATS) -> Iterator[Timing | Untimed]:
     tasks = [(suite.runs[0], suite.folder, estimator, repeats) for estimator in suite.estimators]
     limits = Limits(suite.limits.wall_s * (repeats + 1), suite.limits.rss_mb)
     for task in tasks:
-        ((_, found),) = compute(_time, _untimed, [task], 1, limits)
-        yield found
+        ((_, timing),) = compute(_time, _untimed, [task], 1, limits)
+        yield timing
 
 
 def _untimed(task: TimingTask, loss: TaskFailure) -> Timing | Untimed:
@@ -97,7 +97,7 @@ def _timing(name: str, folds: Sequence[Floats], log_s: float, rss_mb: float) -> 
 
 
 def _fold_us(run: Run, estimator: EstimatorSpec) -> Floats:
-    """How long each measurement took, (n,) [µs]."""
+    """Processor time of each measurement, (n,) [µs]."""
     built = fusion.build(estimator.use, run.world, estimator.params)
     tracker = fusion.Tracker(built, run.world, starting_prior(run))
     clock = [time.process_time_ns()]
@@ -108,7 +108,7 @@ def _fold_us(run: Run, estimator: EstimatorSpec) -> Floats:
 
 
 def machine() -> dict[str, str]:
-    """What the figures are true of."""
+    """Machine and versions that the figures hold for."""
     return {
         "machine": platform.machine(),
         "processor": platform.processor() or "unknown",

@@ -11,9 +11,6 @@ from benchmarks.runner.plan import Cell
 from benchmarks.runner.store import Store
 from benchmarks.runner.workers import Limits, TaskFailure
 
-NOT_DETERMINISTIC, NOT_MEASURED = 5, 3
-"""Exit codes."""
-
 
 def differing(cells: Sequence[Cell], store: Store, count: int, limits: Limits) -> list[Cell]:
     """The cells, of ``count`` evenly spread over the keys of those that are there, that come out differently now.
@@ -21,7 +18,7 @@ def differing(cells: Sequence[Cell], store: Store, count: int, limits: Limits) -
     Each within ``limits`` in a process of its own, for some hang or die. Those that broke a limit are left out: how
     far they come depends on the machine.
     """
-    there = sorted((cell for cell in cells if _is_pure(cell, store)), key=lambda cell: cell.estimate_key)
+    there = sorted((cell for cell in cells if is_pure(cell, store)), key=lambda cell: cell.estimate_key)
     sample = there[:: max(len(there) // count, 1)][:count] if count else []
     with tempfile.TemporaryDirectory(prefix="fusion-verify-") as folder:
         again = Store(Path(folder))
@@ -29,8 +26,8 @@ def differing(cells: Sequence[Cell], store: Store, count: int, limits: Limits) -
         return [cell for cell in done if not _same(cell, store, again)]
 
 
-def _is_pure(cell: Cell, store: Store) -> bool:
-    """Whether the cell is there, and ended by itself."""
+def is_pure(cell: Cell, store: Store) -> bool:
+    """True where the cell is there, and ended by itself."""
     if not store.has("scores", cell.score_key):
         return False
     made = store.read_json("estimates", cell.estimate_key, "result.json")

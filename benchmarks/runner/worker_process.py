@@ -1,4 +1,4 @@
-"""The other side of `benchmarks.runner.workers`: what one of the processes does, and when it ends itself."""
+"""The other side of `benchmarks.runner.workers`: the loop of one process, and the watches that end it."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
 OUT_OF_MEMORY = 77
-"""Exit code by which a worker says that its task took more memory than it may."""
+"""Exit code of a worker whose task took more memory than it may."""
 WATCH_S = 0.05
 
 
 class Answer(NamedTuple):
-    """What a worker sends back: a value, or what was raised instead."""
+    """Answer of a worker: a value, or the exception raised instead."""
 
     value: Any
     raised: BaseException | None = None
@@ -31,7 +31,7 @@ class Answer(NamedTuple):
 
 
 def serve(connection: Connection, work: Callable[[Any], Any], rss_mb: float | None, idle_s: float | None) -> None:
-    """The life of a worker: say that it is ready, then answer task after task until nobody asks any more."""
+    """The life of a worker: report that it is ready, then answer task after task until nobody asks any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_watch_parent, daemon=True).start()
     if rss_mb is not None:

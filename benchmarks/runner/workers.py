@@ -28,12 +28,12 @@ Result = TypeVar("Result")
 
 _PROCESSES = threading.RLock()
 """Held to start a process or to learn how one ended: whenever `multiprocessing` starts one, in whatever thread, it
-buries all that have ended, and who asks at that moment is told nothing.
+buries all that have ended, and another thread that asks at that moment gets no exit code.
 """
 
 
 class Limits(NamedTuple):
-    """What one task may take; None: all there is."""
+    """Limits of one task; None: all there is."""
 
     wall_s: float | None = None
     rss_mb: float | None = None
@@ -41,7 +41,7 @@ class Limits(NamedTuple):
 
 @unique
 class TaskFailure(Enum):
-    """Why a task has no result."""
+    """Reasons why a task has no result."""
 
     CRASHED = "crashed"
     TIMEOUT = "timeout"
@@ -141,7 +141,7 @@ class WorkerPool(Generic[Task, Result]):
                 yield at, answer
 
     def _require_not_dismissed(self) -> None:
-        """What is lost with a process that was dismissed says nothing about its task."""
+        """The loss of a process that was dismissed is no failure of its task."""
         if self._dismissed:
             raise CancelledError("dismissed while at work")
 
@@ -175,11 +175,11 @@ class _Worker:
     def give(self, index: int, task: object) -> None:
         self.ready, self.index = False, index
         self.deadline_s = None if self._wall_s is None else time.monotonic() + self._wall_s
-        with suppress(BrokenPipeError):  # it died while it had nothing to do, and `listen` will say so
+        with suppress(BrokenPipeError):  # it died while it had nothing to do, and `listen` will report it
             self.connection.send(task)
 
     def listen(self) -> Answer | TaskFailure | None:
-        """What it has to say now; None: nothing, or that it is ready for its first task."""
+        """Its answer or failure by now; None: neither, or that it is ready for its first task."""
         try:
             answer = self.connection.recv() if self.connection.poll() else None
         except (EOFError, OSError):

@@ -1,4 +1,4 @@
-"""Two estimators on one run: what can be said within it, and the label that it says nothing beyond it.
+"""Two estimators on one run: a comparison that holds within it, and is labelled as not holding beyond it.
 
 Errors of neighbouring instants are nearly the same, so instants cannot be drawn one by one. The stationary bootstrap
 (Politis & Romano 1994) draws blocks of geometrically distributed length, the same for both estimators; their mean
@@ -23,12 +23,12 @@ RESAMPLES = 1000
 LEAST_INSTANTS = 30
 """Of fewer instants no block length can be found."""
 QUIET_LAGS = 5
-"""Politis & White say max(5, sqrt(log10 n)), which is 5 for every n that fits into a computer."""
+"""Politis & White give max(5, sqrt(log10 n)), which is 5 for every n that fits into a computer."""
 
 
 @dataclass(frozen=True, slots=True)
 class WithinRun:
-    """What one run says about two estimators: their ratio of error quantiles, first over second, and its percentile
+    """Comparison of two estimators on one run: their ratio of error quantiles, first over second, and its percentile
     interval. It holds for these ``instants``; another run is another draw, of which it knows nothing.
     """
 
@@ -44,7 +44,7 @@ class WithinRun:
 
     @property
     def winner(self) -> str | None:
-        """The better of the two on this run; None: it cannot tell."""
+        """The better of the two on this run; None: it is inconclusive."""
         if self.low <= 1.0 <= self.high:
             return None
         return self.first if self.high < 1.0 else self.second
@@ -52,10 +52,11 @@ class WithinRun:
     @property
     def sentence(self) -> str:
         """The verdict for people, labelled as what it is."""
-        drawn = f"{self.instants} instants in blocks of {self.block:.0f}; says nothing of other runs"
+        drawn = f"{self.instants} instants in blocks of {self.block:.0f}; other runs may differ"
         if self.winner is None:
             ratio = f"ratio {self.ratio:.2f} [{self.low:.2f}, {self.high:.2f}]"
-            return f"within this run, cannot tell {self.first} from {self.second} on {self.metric}: {ratio} ({drawn})"
+            pair = f"inconclusive between {self.first} and {self.second}"
+            return f"within this run, {pair} on {self.metric}: {ratio} ({drawn})"
         loser = self.second if self.winner == self.first else self.first
         gain = by_percent(self.ratio, self.low, self.high)
         return f"within this run, {self.winner} beats {loser} {gain} on {self.metric} ({drawn})"
@@ -110,7 +111,7 @@ def _block_length_of_quantile(errors: Floats, share: float) -> float:
 
 
 def block_length(series: Floats) -> float:
-    """The mean block length with which the stationary bootstrap tells the variance of the mean of ``series`` (n,) best.
+    """Mean block length of the stationary bootstrap that estimates the variance of the mean of ``series`` (n,) best.
 
     (G / g)^(2/3) n^(1/3) with flat-top weighted sums over all lags k, G of |k| R(k) and g of the autocovariance R(k)
     (Politis & White 2004; Patton, Politis & White 2009). At least 1, at most three roots of n and a third of n.

@@ -1,4 +1,4 @@
-"""Letters for a leaderboard: names that share one cannot be told apart (a compact letter display)."""
+"""Letters for a leaderboard: names that share one cannot be distinguished (a compact letter display)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How sure can one be that an estimator is better? The tests, as pure functions of arrays.
+"""Paired tests of estimators, as pure functions of arrays.
 
 The unit is the recorded run, never the frame: errors a tenth of a second apart are nearly the same error, and a test
 that counts them as many finds a difference between equal estimators four times in five. What is compared is the

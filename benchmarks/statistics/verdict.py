@@ -1,4 +1,4 @@
-"""Who beats whom, and how sure that is: every pair of estimators in one sentence.
+"""Verdicts on every pair of estimators, with their uncertainty, in one sentence each.
 
 A pair is decided by the t interval of its log ratios, corrected over all pairs (Holm 1979): with ten estimators there
 are 45 pairs, and of 45 equal pairs two would differ at 5 % by chance. Where one of the two was lost in a run (an
@@ -35,12 +35,12 @@ from fusion import ParameterError
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What the runs say about one pair.
+    """Verdict of the runs on one pair.
 
     ``log_ratio``: of first over second, below 0 where the first is better, from the ``compared`` runs in which both
     scored. In the others at least one was lost: ``wins`` (only the second was), ``losses`` (only the first), ``ties``
-    (both were). ``signed_rank`` is of all runs. ``holm_p`` is the p that decides, ``signed_rank_holm_p`` that of the
-    signed ranks, both corrected over all pairs that were compared together.
+    (both were). ``signed_rank`` is of all runs. ``holm_p`` is the p that decides, corrected over all pairs
+    that were compared together.
     """
 
     first: str
@@ -54,7 +54,6 @@ class Verdict:
     log_ratio: MeanInterval[float]
     signed_rank: SignedRank
     holm_p: float
-    signed_rank_holm_p: float
 
     @property
     def runs(self) -> int:
@@ -63,7 +62,7 @@ class Verdict:
 
     @property
     def by_rank(self) -> bool:
-        """Whether the signed ranks decide, because one of the two was lost where the other was not."""
+        """True where the signed ranks decide, because one of the two was lost where the other was not."""
         return bool(self.wins or self.losses)
 
     @property
@@ -73,7 +72,7 @@ class Verdict:
 
     @property
     def winner(self) -> str | None:
-        """The better of the two; None: the runs cannot tell."""
+        """The better of the two; None: the runs are inconclusive."""
         if self.holm_p >= 1.0 - self.level:
             return None
         leaning = self.signed_rank.sum if self.by_rank else self.log_ratio.mean
@@ -97,9 +96,9 @@ class Verdict:
 
     @property
     def runs_needed(self) -> int | None:
-        """How many runs would show the observed difference four times in five; None: more than can be driven."""
+        """Number of runs that would show the observed difference four times in five; None: more than can be driven."""
         mean, std = abs(self.log_ratio.mean), self.log_ratio.std
-        if std == 0.0:  # runs that all say exactly the same settle any difference at once
+        if std == 0.0:  # runs that all have exactly the same ratio settle any difference at once
             return 2 if mean else None
         return runs_needed(mean / std, self.level)
 
@@ -107,12 +106,12 @@ class Verdict:
     def sentence(self) -> str:
         """The verdict for people, with its uncertainty."""
         if self.winner is None:
-            said = f"cannot tell {self.first} from {self.second} on {self.metric}"
-            return f"{said}: {self._ranks() if self.by_rank else self._uncertainty()}"
-        said = f"{self.winner} beats {self.second if self.winner == self.first else self.first}"
+            pair = f"inconclusive between {self.first} and {self.second} on {self.metric}"
+            return f"{pair}: {self._ranks() if self.by_rank else self._uncertainty()}"
+        pair = f"{self.winner} beats {self.second if self.winner == self.first else self.first}"
         if self.by_rank:
-            return f"{said} on {self.metric}: {self._ranks()}"
-        return f"{said} {by_percent(*self.ratio)} on {self.metric} ({self.compared} runs)"
+            return f"{pair} on {self.metric}: {self._ranks()}"
+        return f"{pair} {by_percent(*self.ratio)} on {self.metric} ({self.compared} runs)"
 
     def _uncertainty(self) -> str:
         if self.compared < 2:
@@ -137,7 +136,7 @@ def _ratio_text(ratio: float, low: float, high: float) -> str:
 
 
 def by_percent(ratio: float, low: float, high: float) -> str:
-    """How much lower the lower of two scores is, from their ratio or its inverse and an interval that excludes 1.
+    """Percentage by which the lower of two scores is lower, from their ratio or its inverse; its interval excludes 1.
 
     >>> by_percent(0.88, 0.81, 0.96)
     'by 12 % [4, 19]'
@@ -151,7 +150,7 @@ def by_percent(ratio: float, low: float, high: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All pairs of estimators on one metric. ``letters``: estimators that share one cannot be told apart.
+    """All pairs of estimators on one metric. ``letters``: estimators that share one cannot be distinguished.
     ``friedman_p``: that all of them are alike; None for two.
     """
 
@@ -207,14 +206,9 @@ def _judge(medians: Mapping[str, Floats], first: str, second: str, metric: str, 
         log_ratio=mean,
         signed_rank=ranks,
         holm_p=1.0,
-        signed_rank_holm_p=1.0,
     )
 
 
 def _correct(pairs: Sequence[Verdict]) -> tuple[Verdict, ...]:
-    deciding = holm(np.array([pair.p for pair in pairs]))
-    ranks = holm(np.array([pair.signed_rank.p for pair in pairs]))
-    return tuple(
-        replace(pair, holm_p=float(p), signed_rank_holm_p=float(rank_p))
-        for pair, p, rank_p in zip(pairs, deciding, ranks, strict=True)
-    )
+    corrected = holm(np.array([pair.p for pair in pairs])).tolist()
+    return tuple(replace(pair, holm_p=p) for pair, p in zip(pairs, corrected, strict=True))

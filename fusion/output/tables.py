@@ -13,7 +13,7 @@ WIDTH = 120
 """Columns of a table that goes into a file or a pipe."""
 
 
-class Sheet(NamedTuple):
+class Table(NamedTuple):
     """``head`` names the columns. The first names the rows, the others hold numbers, or ``prose`` that stands left."""
 
     title: str
@@ -32,36 +32,36 @@ def console(file: IO[str] | None = None) -> Console:
     return made
 
 
-def print_sheets(sheets: Sequence[Sheet], file: IO[str] | None = None) -> None:
+def print_tables(tables: Sequence[Table], file: IO[str] | None = None) -> None:
     """For a terminal, or a file of 120 columns."""
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
-    from rich.table import Table
+    from rich.table import Table as Grid
 
     output = console(file)
-    for sheet in sheets:
+    for table in tables:
         # What stands in brackets, as a unit may, is text and no markup.
-        table = Table(title=escape(sheet.title), box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
-        for place, title in enumerate(sheet.head):
-            table.add_column(escape(title), justify="left" if place == 0 or sheet.prose else "right")
-        for row in sheet.rows:
-            table.add_row(*map(escape, row))
-        output.print(table)
+        grid = Grid(title=escape(table.title), box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
+        for place, title in enumerate(table.head):
+            grid.add_column(escape(title), justify="left" if place == 0 or table.prose else "right")
+        for row in table.rows:
+            grid.add_row(*map(escape, row))
+        output.print(grid)
 
 
-def as_markdown(sheet: Sheet) -> str:
+def as_markdown(table: Table) -> str:
     r"""A pipe table under its title in bold.
 
-    >>> print(as_markdown(Sheet("Sizes", ("what", "m"), (("a|b", "<1"),))))
+    >>> print(as_markdown(Table("Sizes", ("what", "m"), (("a|b", "<1"),))))
     **Sizes**
     <BLANKLINE>
     | what | m |
     |---|--:|
     | a\|b | &lt;1 |
     """
-    rules = ["---", *(["---" if sheet.prose else "--:"] * (len(sheet.head) - 1))]
-    lines = [_row(sheet.head), "|" + "|".join(rules) + "|", *map(_row, sheet.rows)]
-    return f"**{sheet.title}**\n\n" + "\n".join(lines)
+    rules = ["---", *(["---" if table.prose else "--:"] * (len(table.head) - 1))]
+    lines = [_row(table.head), "|" + "|".join(rules) + "|", *map(_row, table.rows)]
+    return f"**{table.title}**\n\n" + "\n".join(lines)
 
 
 def as_code(text: str) -> str:

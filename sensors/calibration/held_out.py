@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fusion.arrays import Floats
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 
 
 class Interval(NamedTuple):
@@ -55,13 +55,13 @@ def root_mean_square(errors: Floats) -> float:
     return float(np.sqrt(np.mean(np.square(errors)))) if len(errors) else math.nan
 
 
-def sheet(title: str, scores: Sequence[BeforeAfter]) -> Sheet:
+def table(title: str, scores: Sequence[BeforeAfter]) -> Table:
     """As a table, with the share of each error that is left."""
     rows = tuple(
         (f"{score.what}, {score.unit}", str(score.samples), f"{score.before:.4g}", f"{score.after:.4g}", _left(score))
         for score in scores
     )
-    return Sheet(title, ("held-out error", "samples", "before", "after", "left %"), rows)
+    return Table(title, ("held-out error", "samples", "before", "after", "left %"), rows)
 
 
 def _left(score: BeforeAfter) -> str:

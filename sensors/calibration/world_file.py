@@ -13,11 +13,13 @@ from fusion.output.files import write
 from fusion.world import Calibration
 from sensors.calibration.provenance import significant
 
-Table = Mapping[str, Any]
+TomlTable = Mapping[str, Any]
 """Nested tables of names and values, as TOML has them."""
 
 
-def calibrated_text(text: str, changes: Table, anchors: Mapping[str, Table], name: str, record: Calibration) -> str:
+def calibrated_text(
+    text: str, changes: TomlTable, anchors: Mapping[str, TomlTable], name: str, record: Calibration
+) -> str:
     """The world file ``text`` with ``changes``, those of single ``anchors`` by id, and where they come from, under
     ``[calibration.name]``. Raises `WorldError` where the result is no world any more.
     """
@@ -33,7 +35,7 @@ def calibrated_text(text: str, changes: Table, anchors: Mapping[str, Table], nam
     return made
 
 
-def _put(document: MutableMapping[str, Any], changes: Table, *, inline: bool) -> None:
+def _put(document: MutableMapping[str, Any], changes: TomlTable, *, inline: bool) -> None:
     """Set what differs, leave the rest of the text alone; an anchor's own new table stands in its line."""
     import tomlkit
 

@@ -9,12 +9,12 @@ from functools import partial
 
 import numpy as np
 
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 from fusion.robot import Robot
 from logs.run import Run
 from sensors.calibration.gyro import GyroCalibration, calibrate_gyro
 from sensors.calibration.gyro_picture import draw
-from sensors.calibration.held_out import Interval, sheet
+from sensors.calibration.held_out import Interval, table
 from sensors.cli.calibration import Findings, calibrate, configure_common
 
 METHOD = (
@@ -27,15 +27,15 @@ def findings(runs: Sequence[Run], turns: float | None = None) -> Findings:
     """The calibration as tables, sentences and changes of a world."""
     calibration = calibrate_gyro(runs, turns)
     robot = runs[0].world.robot
-    sheets = [_sheet(calibration, robot)]
+    tables = [_table(calibration, robot)]
     if calibration.scores:
-        sheets.append(sheet("Gyro where it was not calibrated", calibration.scores))
+        tables.append(table("Gyro where it was not calibrated", calibration.scores))
     return Findings(
         name="gyro",
         method=METHOD,
         samples=len(calibration.standstills),
         residual_std=float(np.std([stop.bias for stop in calibration.standstills])),
-        sheets=sheets,
+        tables=tables,
         remarks=_remarks(calibration, robot),
         result=calibration._asdict(),
         draw=partial(draw, calibration),
@@ -57,7 +57,7 @@ def _changes(calibration: GyroCalibration, robot: Robot) -> dict[str, object]:
     return changes | ({"noise": noise} if robot.turn_source == "gyro" and noise else {})
 
 
-def _sheet(calibration: GyroCalibration, robot: Robot) -> Sheet:
+def _table(calibration: GyroCalibration, robot: Robot) -> Table:
     rows = [("bias, °/s", f"{DEGREES * robot.gyro_bias_rad_s:.4f}", _degrees(calibration.bias).text(4))]
     if calibration.drift_rad_s is not None:
         rows.append(("its drift between standstills, °/s", "", f"{DEGREES * calibration.drift_rad_s:.4f}"))
@@ -70,7 +70,7 @@ def _sheet(calibration: GyroCalibration, robot: Robot) -> Sheet:
         rows.append(("noise density, °/√s", f"{DEGREES * robot.noise.turn_std_per_sqrt_s:.4f}", noise.text(4)))
         rows.append(("bias instability, °/s", "", f"{'' if calibration.allan.is_lowest else 'below '}{lowest:.4f}"))
     title = f"Gyro, from {len(calibration.standstills)} standstills and {len(calibration.turns)} turns"
-    return Sheet(title, ("", "world", "fit, 95 %"), tuple(rows))
+    return Table(title, ("", "world", "fit, 95 %"), tuple(rows))
 
 
 def _degrees(interval: Interval) -> Interval:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 from logs.run import Run
 from sensors.calibration.arcs import WheelScales
-from sensors.calibration.held_out import BeforeAfter, sheet
+from sensors.calibration.held_out import BeforeAfter, table
 from sensors.calibration.odometry import (
     OdometryCalibration,
     calibrate_odometry,
@@ -40,7 +40,7 @@ def findings(runs: Sequence[Run], segments: Path | None = None) -> Findings:
         method=METHOD,
         samples=len(pieces),
         residual_std=float(np.nanstd(residuals(scales, pieces)[0])),
-        sheets=_sheets(calibration),
+        tables=_tables(calibration),
         remarks=_remarks(calibration),
         result={
             "numbers": calibration.numbers,
@@ -55,7 +55,7 @@ def findings(runs: Sequence[Run], segments: Path | None = None) -> Findings:
     )
 
 
-def _sheets(calibration: OdometryCalibration) -> list[Sheet]:
+def _tables(calibration: OdometryCalibration) -> list[Table]:
     was = WheelScales.of(calibration.robot)
     before = (was.left, was.right, 0.5 * (was.left + was.right), was.right / was.left, was.track_m)
     numbers = zip(calibration.numbers.items(), before, strict=True)
@@ -67,14 +67,14 @@ def _sheets(calibration: OdometryCalibration) -> list[Sheet]:
         ]
     kinds = [each.segment.kind for each in calibration.pieces]
     counts = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
-    sheets = [Sheet(f"Wheels, from {counts}", ("true over measured", "world", "fit, 95 %"), tuple(rows))]
+    tables = [Table(f"Wheels, from {counts}", ("true over measured", "world", "fit, 95 %"), tuple(rows))]
     if calibration.scores:
-        sheets.append(sheet("Odometry on the half that was not fitted", calibration.scores))
+        tables.append(table("Odometry on the half that was not fitted", calibration.scores))
     if calibration.umbmark is not None:
         was_m, now_m = (each.e_max_m for each in calibration.umbmark)
         score = BeforeAfter("UMBmark E_max,syst", "m", calibration.squares, was_m, now_m)
-        sheets.append(sheet("Squares, fitted without them", [score]))
-    return sheets
+        tables.append(table("Squares, fitted without them", [score]))
+    return tables
 
 
 def _remarks(calibration: OdometryCalibration) -> list[str]:

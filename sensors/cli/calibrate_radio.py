@@ -9,10 +9,10 @@ from functools import partial
 from pathlib import Path
 
 from fusion import ParameterError, World
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
 from fusion.radio import RadioKind
 from logs.run import Run
-from sensors.calibration.held_out import Interval, sheet
+from sensors.calibration.held_out import Interval, table
 from sensors.calibration.radio import RadioCalibration, calibrate_radio, changes, kinds_in
 from sensors.calibration.radio_picture import draw
 from sensors.calibration.readings_by_place import UNITS
@@ -45,7 +45,7 @@ def findings(runs: Sequence[Run], points: Path | None = None, place_m: float | N
         method=METHOD,
         samples=sum(len(each.readings.value) for each in calibrations),
         residual_std=calibrations[0].std,
-        sheets=[table for each in calibrations for table in _sheets(world, each)],
+        tables=[table for each in calibrations for table in _tables(world, each)],
         remarks=[remark for each in calibrations for remark in _remarks(each)],
         result={each.kind: _result(each) for each in calibrations},
         draw=partial(draw, world, calibrations),
@@ -76,7 +76,7 @@ def _result(calibration: RadioCalibration) -> dict[str, object]:
     }
 
 
-def _sheets(world: World, calibration: RadioCalibration) -> list[Sheet]:
+def _tables(world: World, calibration: RadioCalibration) -> list[Table]:
     readings, line, unit = calibration.readings, calibration.line, UNITS[calibration.kind]
     count = int(readings.place.max()) + 1
     title = f"{calibration.kind}: {len(readings.value)} readings at {count} places of {readings.place_m:.2g} m"
@@ -91,13 +91,13 @@ def _sheets(world: World, calibration: RadioCalibration) -> list[Sheet]:
         (f"medians of one anchor and place: {line.medians}, worth", f"{line.effective:.0f}"),
     ]
     head = "anchor", "places", GAINS[calibration.kind], LEVELS[calibration.kind], f"σ places, {unit}", "received %"
-    sheets = [
-        Sheet(title, ("", "fit, 95 %"), tuple(rows)),
-        Sheet("Each anchor by itself", head, tuple(_anchor_rows(world, calibration))),
+    tables = [
+        Table(title, ("", "fit, 95 %"), tuple(rows)),
+        Table("Each anchor by itself", head, tuple(_anchor_rows(world, calibration))),
     ]
     if calibration.scores:
-        sheets.append(sheet(f"{calibration.kind} at places that were not fitted", calibration.scores))
-    return sheets
+        tables.append(table(f"{calibration.kind} at places that were not fitted", calibration.scores))
+    return tables
 
 
 def _anchor_rows(world: World, calibration: RadioCalibration) -> Iterator[tuple[str, ...]]:

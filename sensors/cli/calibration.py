@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from fusion import LogError
 from fusion.output.figures import as_png, require_matplotlib
 from fusion.output.files import require_place, write, write_json
-from fusion.output.tables import Sheet, print_sheets
+from fusion.output.tables import Table, print_tables
 from logs.run import Run
 from sensors.calibration.held_out import record
 from sensors.calibration.provenance import load_runs, provenance
-from sensors.calibration.world_file import Table, calibrated_text, world_text, write_world
+from sensors.calibration.world_file import TomlTable, calibrated_text, world_text, write_world
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,12 +32,12 @@ class Findings(NamedTuple):
     method: str
     samples: int
     residual_std: float
-    sheets: Sequence[Sheet]
+    tables: Sequence[Table]
     remarks: Sequence[str]
     result: object
     draw: Callable[[], Figure]
-    changes: Table | None
-    anchors: dict[str, Table]
+    changes: TomlTable | None
+    anchors: dict[str, TomlTable]
 
 
 def configure_common(parser: argparse.ArgumentParser) -> None:
@@ -62,7 +62,7 @@ def calibrate(arguments: argparse.Namespace, findings_of: Callable[[list[Run]], 
         sys.stderr.write(f"fusion calibrate {findings.name}: {remark}\n")
     about = provenance(runs, findings.method, findings.samples, findings.residual_std)
     if arguments.json != Path("-"):
-        print_sheets(findings.sheets)
+        print_tables(findings.tables)
     if arguments.json is not None:
         header = {"calibrates": findings.name, "remarks": list(findings.remarks), "changes": findings.changes}
         write_json(

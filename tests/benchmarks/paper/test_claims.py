@@ -7,7 +7,7 @@ from benchmarks.paper import evidence
 from benchmarks.paper.claims import CLAIMS, FEWEST_RUNS, Judged, in_words, judge, runs_to_decide, verdict
 from benchmarks.paper.experiment import Outcome
 from benchmarks.paper.interpretation_study import effects, literal_of_scale, rank
-from benchmarks.paper.interpretations import MISSING_VALUES, ORIGINS_M, READINGS
+from benchmarks.paper.interpretations import INTERPRETATIONS, MISSING_VALUES, ORIGINS_M
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.straight_moves import MOVES_M
 from benchmarks.paper.summary import Share, Spread
@@ -26,7 +26,7 @@ def outcome(odometry, wifi, proposed, environment=OFFICE, **more):
     n, p, _ = errors[PROPOSED].shape
     parts = {
         "refused": np.zeros((n, p), bool),
-        "readings": np.tile(errors[PROPOSED].max(axis=(1, 2))[:, None], (1, len(READINGS))),
+        "interpretations": np.tile(errors[PROPOSED].max(axis=(1, 2))[:, None], (1, len(INTERPRETATIONS))),
         "missing": np.ones((n, len(MISSING_VALUES))),
         "origins": np.ones((n, len(ORIGINS_M))),
         "moves": np.tile(np.array(MOVES_M) * 1.02, (n, 1)),
@@ -119,7 +119,7 @@ def test_refusals_are_weighed_against_what_was_refused():
         pytest.param([(0, 100), (1, 100)], "not reproduced", id="nearly never everywhere"),
         pytest.param([(0, 100), (100, 100)], "reproduced in 50 %", id="always here, never there"),
         pytest.param([(90, 100), (90, 100)], "reproduced in 90 %", id="the interval reaches below 90 %"),
-        pytest.param([(0, 24), (0, 100)], "cannot tell from 24 runs", id="too few runs in one environment"),
+        pytest.param([(0, 24), (0, 100)], "inconclusive from 24 runs", id="too few runs in one environment"),
         pytest.param([(0, 25)], "not reproduced", id="just enough"),
     ],
 )
@@ -209,23 +209,25 @@ def test_spread_counts_runs_without_an_answer_as_infinite():
     assert Spread.of(np.array([1.0, 2.0, 3.0, np.inf])) == (2.5, pytest.approx(1.15), np.inf)
 
 
-def test_readings_are_ranked_by_how_far_they_are_from_the_paper():
+def test_interpretations_are_ranked_by_how_far_they_are_from_the_paper():
     """One reading hits every published maximum, one is twice as far everywhere, the others ten times."""
     exact, twice = 17, literal_of_scale("floor")
     made = []
     for environment in ENVIRONMENTS:
-        readings = np.full((3, len(READINGS)), 10.0 * environment.proposed_max_m)
-        readings[:, exact], readings[:, twice] = environment.proposed_max_m, environment.proposed_max_m / 2.0
-        made.append(outcome(*[[[0.1]] * 3] * 3, environment, readings=readings))
+        made_m = np.full((3, len(INTERPRETATIONS)), 10.0 * environment.proposed_max_m)
+        made_m[:, exact], made_m[:, twice] = environment.proposed_max_m, environment.proposed_max_m / 2.0
+        made.append(outcome(*[[[0.1]] * 3] * 3, environment, interpretations=made_m))
     ranked = rank(made)
-    assert [each.reading for each in ranked[:2]] == [READINGS[exact], READINGS[twice]]
+    assert [each.interpretation for each in ranked[:2]] == [INTERPRETATIONS[exact], INTERPRETATIONS[twice]]
     assert [each.factor for each in ranked[:3]] == pytest.approx([1.0, 2.0, 10.0])
 
 
 def test_effect_of_an_option_is_the_geometric_mean_over_all_others():
     """Feedback alone decides: 2 m with, 8 m without."""
-    row = [2.0 if reading.options["feedback"] else 8.0 for reading in READINGS]
-    made = [outcome(*[[[0.1]] * 3] * 3, environment, readings=np.array([row] * 3)) for environment in ENVIRONMENTS]
+    row = [2.0 if each.options["feedback"] else 8.0 for each in INTERPRETATIONS]
+    made = [
+        outcome(*[[[0.1]] * 3] * 3, environment, interpretations=np.array([row] * 3)) for environment in ENVIRONMENTS
+    ]
     found = {effect.option: effect for effect in effects(made)}
     assert found["feedback"].medians_m == {"True": pytest.approx((2.0,) * 3), "False": pytest.approx((8.0,) * 3)}
     assert found["feedback"].ratio == pytest.approx((4.0,) * 3)

@@ -14,7 +14,7 @@ from benchmarks.paper.claims import in_words
 from benchmarks.paper.experiment import run_experiments
 from benchmarks.paper.figures import FIGURES
 from benchmarks.paper.fit_environments import SEEDS
-from benchmarks.paper.interpretations import ORIGINS_M, READINGS, literal
+from benchmarks.paper.interpretations import INTERPRETATIONS, ORIGINS_M, literal
 from benchmarks.paper.page import markdown
 from benchmarks.paper.published import EKF, ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
 from benchmarks.paper.reproduce import reproduce
@@ -54,7 +54,7 @@ def test_a_seed_gives_its_run_whichever_is_the_first_and_whatever_the_workers(re
         assert (alone.seeds, both.seeds) == ((6,), (5, 6))
         assert set(alone.errors) == {"particle", *PAPER}
         assert all(np.array_equal(alone.errors[name][0], both.errors[name][1]) for name in alone.errors)
-        for what in ("refused", "readings", "missing", "origins", "moves"):
+        for what in ("refused", "interpretations", "missing", "origins", "moves"):
             assert np.array_equal(getattr(alone, what)[0], getattr(both, what)[1])
         assert alone.alternatives == {
             filling: {curve: largest[1:] for curve, largest in curves.items()}
@@ -73,7 +73,7 @@ def test_every_estimator_runs_on_the_same_runs_and_some_on_a_gyro(report):
 def test_literal_reading_and_unmoved_origin_are_the_proposed_method_itself(report):
     for outcome in report.outcomes:
         own = outcome.largest(PROPOSED)
-        assert outcome.readings[:, READINGS.index(literal())] == pytest.approx(own, abs=1e-6)
+        assert outcome.interpretations[:, INTERPRETATIONS.index(literal())] == pytest.approx(own, abs=1e-6)
         assert outcome.origins[:, ORIGINS_M.index(0.0)] == pytest.approx(own, abs=1e-6)
 
 
@@ -144,7 +144,7 @@ def test_trials_or_seeds_without_a_meaning_are_refused(trials, seed):
         reproduce(trials, seed=seed)
 
 
-def test_missing_scenarios_are_told(tmp_path):
+def test_missing_scenarios_are_reported(tmp_path):
     with pytest.raises(WorldError, match=r"alternatives\.toml: no numbers .*--calibrate"):
         reproduce(1, scenarios=tmp_path)
 
@@ -154,18 +154,18 @@ def test_gyro_turns_are_nearer_the_truth_than_wheel_turns():
     scenario, wheels, gyro = load_scenario("paper_arena"), [], []
     for seed in range(5):
         run = simulated_run(scenario, seed)
-        for told, into in ((run, wheels), (with_gyro(run, scenario.reality), gyro)):
-            instants = evaluation_instants(told.truth)
-            into.append(errors(instants, match(instants, run_estimator(told, ODOMETRY).track)).heading[-1])
+        for each, into in ((run, wheels), (with_gyro(run, scenario.reality), gyro)):
+            instants = evaluation_instants(each.truth)
+            into.append(errors(instants, match(instants, run_estimator(each, ODOMETRY).track)).heading[-1])
     assert np.median(gyro) < 0.5 * np.median(wheels)
 
 
 def test_page_has_every_table_and_figure_and_leaves_no_place_open(report):
     text = markdown(report, lambda name: f"{name}.png")
     assert "{{" not in text
-    assert all(as_markdown(sheet) in text for sheet in report.sheets.values())
+    assert all(as_markdown(table) in text for table in report.tables.values())
     assert all(f"]({name}.png)" in text for name in FIGURES)
-    assert "cannot tell from 2 runs" in text
+    assert "inconclusive from 2 runs" in text
     assert f"{in_words(report.judged)} How often" in text
 
 
@@ -185,8 +185,8 @@ def test_command_prints_tables_and_writes_what_is_asked(report, tmp_path, monkey
     )
     assert (asked["trials"], asked["seed"], asked["estimators"]) == (2, 5, ["ekf"])
     out = capsys.readouterr().out
-    for sheet in report.sheets.values():
-        assert sheet.title.split(":")[0] in out
+    for table in report.tables.values():
+        assert table.title.split(":")[0] in out
     assert f"\n{in_words(report.judged)}\n" in out
     assert json.loads(files["json"].read_text()) == json.loads(json.dumps(report.record(), allow_nan=False))
     assert files["png"].read_bytes().startswith(b"\x89PNG")
@@ -194,10 +194,10 @@ def test_command_prints_tables_and_writes_what_is_asked(report, tmp_path, monkey
     html = files["html"].read_text()
     assert html.count("data:image/png;base64,") == len(FIGURES)
     assert not re.search(r'(src|href)="(?!data:)', html)
-    assert html.count("<table>") == html.count("</table>") > len(report.sheets)
+    assert html.count("<table>") == html.count("</table>") > len(report.tables)
 
 
-def test_file_that_cannot_be_written_is_told_before_any_work(tmp_path, capsys):
+def test_file_that_cannot_be_written_is_reported_before_any_work(tmp_path, capsys):
     assert main(["reproduce", "--json", str(tmp_path)]) == 1
     assert "cannot be written" in capsys.readouterr().err
 

@@ -1,4 +1,4 @@
-"""One run told in other ways is still the same run."""
+"""One run in other forms is still the same run."""
 
 import json
 import math
@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from benchmarks.paper.interpretation_study import literal_of_scale
-from benchmarks.paper.interpretations import OPTIONS, READINGS, SCALES, literal
+from benchmarks.paper.interpretations import INTERPRETATIONS, OPTIONS, SCALES, literal
 from benchmarks.paper.published import ENVIRONMENTS, ODOMETRY, PROPOSED, WIFI
-from benchmarks.paper.trial import track_errors
+from benchmarks.paper.trial import point_errors
 from benchmarks.paper.variants import MISSING_SHARE, leg_by_leg, missing_wifi, moved_by, with_gyro, without_gyro
 from benchmarks.runner.estimator_run import run_estimator
 from fusion import Gyro, Odometry, WifiScan
@@ -24,7 +24,7 @@ def plain(scenario="paper_office", seed=3):
 
 
 def errors(run, estimator, **options):
-    return track_errors(run, run_estimator(run, estimator, options))
+    return point_errors(run, run_estimator(run, estimator, options).track)
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -56,7 +56,7 @@ def test_leg_by_leg_knows_the_distance_travelled_to_the_drift_of_the_legs():
 
 @pytest.mark.parametrize("offset_m", [None, 100.0])
 @pytest.mark.parametrize("scale", ["travelled", "floor"])
-def test_moved_map_changes_nothing_for_readings_without_an_origin(offset_m, scale):
+def test_moved_map_changes_nothing_for_interpretations_without_an_origin(offset_m, scale):
     run = plain()
     moved = errors(moved_by(run, offset_m), PROPOSED, outlier_relative_to=scale)
     assert moved == pytest.approx(errors(run, PROPOSED, outlier_relative_to=scale), abs=1e-6)
@@ -92,11 +92,11 @@ def test_missing_wifi_takes_one_reading_from_a_fifth_of_the_scans_and_nothing_el
     assert hit / total == pytest.approx(MISSING_SHARE, abs=4.0 * math.sqrt(0.2 * 0.8 / total))
 
 
-def test_readings_are_all_combinations_once_and_the_defaults_are_one_of_them():
-    assert len(set(READINGS)) == len(READINGS) == np.prod([len(values) for values in OPTIONS.values()])
-    assert literal() in READINGS
-    assert READINGS[literal_of_scale("coordinate")] == literal()
-    assert READINGS[literal_of_scale("floor")].options == {**literal().options, "outlier_relative_to": "floor"}
+def test_interpretations_are_all_combinations_once_and_the_defaults_are_one_of_them():
+    assert len(set(INTERPRETATIONS)) == len(INTERPRETATIONS) == np.prod([len(values) for values in OPTIONS.values()])
+    assert literal() in INTERPRETATIONS
+    assert INTERPRETATIONS[literal_of_scale("coordinate")] == literal()
+    assert INTERPRETATIONS[literal_of_scale("floor")].options == {**literal().options, "outlier_relative_to": "floor"}
 
 
 def test_odometry_increments_of_a_leg_are_turn_straight_turn():

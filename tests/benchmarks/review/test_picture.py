@@ -12,12 +12,6 @@ from benchmarks.review.picture import SIZE, headless_viewer, render
 from benchmarks.review.review import review
 from benchmarks.review.window import has_display, open_viewer, serve_web
 from fusion import FusionError, LogError, PluginError, ViewerError
-from sensors.simulation.simulate import simulate
-
-
-@pytest.fixture
-def log(tmp_path):
-    return simulate("office", tmp_path / "run.mcap", duration_s=10.0)
 
 
 @contextmanager

@@ -15,8 +15,6 @@ from benchmarks.runner.adhoc_suite import bench
 from fusion import FusionError
 from fusion.output.colours import ANCHOR, TRUTH, colour_of
 from fusion.output.figures import plain
-from logs.reader import read_run
-from sensors.simulation.simulate import simulate
 
 NAMES = ("dead_reckoning", "ekf")
 
@@ -31,16 +29,6 @@ class Broken:
 
     def start(self, prior, seed):
         raise ZeroDivisionError("on purpose")
-
-
-@pytest.fixture(scope="module")
-def log(tmp_path_factory):
-    return simulate("office", tmp_path_factory.mktemp("plain") / "run.mcap", duration_s=30.0)
-
-
-@pytest.fixture(scope="module")
-def run(log):
-    return read_run(log)
 
 
 def folded(run, names):

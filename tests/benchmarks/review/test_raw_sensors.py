@@ -1,4 +1,4 @@
-"""Motion sensors as they came."""
+"""Motion sensors as they came, and events of the devices."""
 
 import math
 
@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import fusion
-from benchmarks.review.raw_sensors import SPEED, TURN_RATE, raw_series
-from fusion import Gyro, MotorCommand, Odometry, WheelTicks
+from benchmarks.review.raw_sensors import SPEED, TURN_RATE, raw_series, worth_a_line
+from fusion import Diagnostic, Gyro, Level, MotorCommand, Odometry, WheelTicks
+from logs.run import Run
 
 SECOND_NS = 1_000_000_000
 ANCHORS = [{"id": n, "position_m": [i, i * i]} for i, n in enumerate("abc")]
@@ -47,3 +48,14 @@ def test_single_message_of_an_encoder_gives_no_speed_and_no_motion_nothing():
     assert len(time_ns) == len(speed) == 0
     assert raw_series(WORLD, []) == {}
     assert np.isfinite(speed).all()
+
+
+def diagnostic(text, level=Level.WARN):
+    return Diagnostic(1, "gyro", level, text)
+
+
+def test_openings_and_complaints_are_events_and_routine_is_not():
+    events = [diagnostic("opened", Level.OK), diagnostic("gone"), diagnostic("broken", Level.ERROR)]
+    routine = [diagnostic("status"), diagnostic("status", Level.OK), diagnostic("state of the chip", Level.OK)]
+    run = Run(None, "r", None, None, {}, (), None, (), {}, diagnostics=tuple(events + routine))
+    assert worth_a_line(run) == events

@@ -11,12 +11,6 @@ from benchmarks.review.review import review
 from fusion import ParameterError
 from fusion.cli.main import main
 from logs.reader import read_run
-from sensors.simulation.simulate import simulate
-
-
-@pytest.fixture(scope="module")
-def log(tmp_path_factory):
-    return simulate("office", tmp_path_factory.mktemp("review") / "run.mcap", duration_s=30.0)
 
 
 def told(capsys, *words):

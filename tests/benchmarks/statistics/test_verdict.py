@@ -45,7 +45,7 @@ def test_unclear_pair_says_how_many_runs_would_settle_it():
     verdict = verdict_of(UNSURE, EASE)
     assert verdict.winner is None
     assert verdict.sentence == (
-        "cannot tell ekf from particle on pos_p75: ratio 0.96 [0.78, 1.18], needs at least 340 runs "
+        "inconclusive between ekf and particle on pos_p75: ratio 0.96 [0.78, 1.18], needs at least 340 runs "
         "(8 runs show differences from 25 %)"
     )
 

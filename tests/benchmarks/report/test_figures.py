@@ -1,4 +1,4 @@
-"""The figures of a report: nothing cut, nothing told by colour alone, and from every point a click that leads to its
+"""The figures of a report: nothing cut, nothing shown by colour alone, and from every point a click that leads to its
 cell, tried in a real browser.
 """
 
@@ -20,10 +20,10 @@ from benchmarks.report.report_data import ReportData
 from benchmarks.report.sensitivity import curves, sweeps
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite_file import load_suite
 from fusion.cli.main import main
 from fusion.output.figures import as_png, plain_colour
-from tests.benchmarks.browser import CHROMIUM, chromium
+from tests.benchmarks.report.browser import CHROMIUM, chromium
+from tests.benchmarks.suite_files import write_suite
 
 SUITE = """
 [suite]
@@ -57,8 +57,7 @@ grid = { window_s = [1.0, 2.5] }
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp("figures")
-    (folder / "suite.toml").write_text(SUITE, encoding="utf-8")
-    suite, store = load_suite(folder / "suite.toml"), Store(folder / "store")
+    suite, store = write_suite(folder, SUITE), Store(folder / "store")
     results = run_suite(suite, store, workers=1)
     assert main(["bench", "time", str(folder / "suite.toml"), "--store", str(folder / "store"), "--repeats", "1"]) == 0
     return ReportData(suite, results, store)
@@ -72,7 +71,7 @@ def panels(data):
 
 
 def targets_of(panel):
-    """What a page is told of a panel."""
+    """Targets of a panel, as the page has them."""
     return json.loads(html.unescape(re.search(r'data-targets="([^"]*)"', panel.block()).group(1)))
 
 
@@ -103,10 +102,10 @@ def test_every_figure_is_drawn_whole(panels):
 def test_every_panel_leads_to_cells_that_it_names(panels, data):
     for panel in (panel for drawn in panels.values() for panel in drawn):
         assert targets_of(panel)
-        for anchor, said, *_ in targets_of(panel):
+        for anchor, caption, *_ in targets_of(panel):
             run_id, estimator = entry_of(data, anchor)
-            assert estimator.partition("[")[0] in said
-            assert run_id in said or panel.title == "Accuracy against cost"
+            assert estimator.partition("[")[0] in caption
+            assert run_id in caption or panel.title == "Accuracy against cost"
 
 
 def test_what_leads_lies_where_the_picture_has_ink_of_that_colour(panels, data):
@@ -115,11 +114,11 @@ def test_what_leads_lies_where_the_picture_has_ink_of_that_colour(panels, data):
 
     for panel in (panels["accuracy"][1], *panels["consistency"], *panels["cost"]):
         pixels = imread(BytesIO(as_png(panel.figure)))[:, :, :3]
-        for anchor, said, xs, ys in targets_of(panel):
+        for anchor, caption, xs, ys in targets_of(panel):
             colour = plain_colour(data.use(entry_of(data, anchor)[1]))
             row, column = (int(place * size / 1e4) for place, size in zip((ys[0], xs[0]), pixels.shape, strict=False))
             near = pixels[row - 2 : row + 3, column - 2 : column + 3].reshape(-1, 3)
-            assert np.abs(near - colour).max(axis=1).min() < 0.1, said
+            assert np.abs(near - colour).max(axis=1).min() < 0.1, caption
 
 
 def test_line_over_time_leads_to_its_moments_the_worst_among_them(data):
@@ -156,18 +155,18 @@ def test_consistency_draws_what_the_tables_say_and_crosses_what_lies_outside(dat
     answers, readings = consistency(data)
     cells = [one for one in data.results if one.cell.run.split == "test" and np.isfinite(one.metrics["anees"])]
     assert {anchor for anchor, *_ in targets_of(answers)} == {data.anchor(one) for one in cells}
-    told = [cell for row in innovations(data).rows for cell in row[3:]]
-    assert told
-    assert [link_of(*target[:2]) for target in targets_of(readings)] == [cell.replace("**", "") for cell in told]
+    means = [mean for row in innovations(data).rows for mean in row[3:]]
+    assert means
+    assert [link_of(*target[:2]) for target in targets_of(readings)] == [mean.replace("**", "") for mean in means]
     bands = [[one.metrics[f"anees{key}"] for key in ("_band_low", "", "_band_high")] for one in cells]
     outside = sum(band != sorted(band) for band in bands)
     assert 0 < outside < len(cells)
     assert (markers(answers, crosses=True), markers(answers, crosses=False)) == (outside, len(cells) - outside)
 
 
-def link_of(anchor, said):
+def link_of(anchor, caption):
     """A point of the figure as the table has it."""
-    mean, band = said.partition("wifi ")[2].split(" ", 1)
+    mean, band = caption.partition("wifi ")[2].split(" ", 1)
     return f"[{mean}](#{anchor}) {band}"
 
 
@@ -182,7 +181,7 @@ def markers(panel, *, crosses):
 CLICKS = """
 <script>
 const pause = () => new Promise((done) => setTimeout(done, 20));
-async function click(figure, [cell, said, xs, ys, times]) {
+async function click(figure, [cell, caption, xs, ys, times]) {
   const k = Math.floor(xs.length / 2), image = figure.firstElementChild;
   image.scrollIntoView({ block: "center" });
   await pause();

@@ -35,6 +35,7 @@ from logs.prior import begin_ns
 from logs.reader import read_run, read_world
 from logs.truth import evaluation_instants
 from sensors.simulation.simulate import simulate
+from tests.benchmarks.suite_files import write_suite
 
 SUITE = """
 [suite]
@@ -66,9 +67,7 @@ def fault(table):
 
 @pytest.fixture
 def suite(tmp_path):
-    path = tmp_path / "small.toml"
-    path.write_text(SUITE, encoding="utf-8")
-    return load_suite(path)
+    return write_suite(tmp_path, SUITE)
 
 
 def everything(store):
@@ -122,9 +121,8 @@ def test_another_evaluation_scores_old_tracks_again_without_an_estimator(suite, 
 def test_scoring_anew_opens_no_run_and_says_the_same(tmp_path, monkeypatch, reading):
     text = SUITE.replace("paper_", "").replace("seeds = 2", f'eval = {{ reading = "{reading}" }}')
     late = fault('kind = "kidnap", from_s = 5.0, until_s = 9.0')
-    (tmp_path / "dense.toml").write_text(text.replace("[[estimators]]", late, 1), encoding="utf-8")
     store = Store(tmp_path / "store")
-    cells = cells_of(load_suite(tmp_path / "dense.toml"), store)
+    cells = cells_of(write_suite(tmp_path, text.replace("[[estimators]]", late, 1)), store)
     for cell in cells:
         carry_out((cell, store.folder))
     expected = digests(read_results(cells, store))
@@ -138,8 +136,7 @@ def test_scoring_anew_opens_no_run_and_says_the_same(tmp_path, monkeypatch, read
 
 
 def test_interpolated_evaluation_is_another_score_of_the_same_estimates(tmp_path):
-    (tmp_path / "dense.toml").write_text(SUITE.replace("paper_", ""), encoding="utf-8")
-    suite, store = load_suite(tmp_path / "dense.toml"), Store(tmp_path / "store")
+    suite, store = write_suite(tmp_path, SUITE.replace("paper_", "")), Store(tmp_path / "store")
     causal = run_suite(suite, store, workers=1)
     offline = replace(suite, evaluation=replace(suite.evaluation, reading="interp"))
     again = run_suite(offline, store, workers=1)
@@ -152,18 +149,16 @@ def test_a_key_depends_on_run_parameters_seed_and_nothing_else(suite, tmp_path):
     store = Store(tmp_path / "store")
     keys = [cell.estimate_key for cell in cells_of(suite, store)]
     assert len(set(keys)) == len(keys)
-    changed = tmp_path / "changed.toml"
-    changed.write_text(SUITE.replace('"small"', '"other"').replace('id = "pf"', 'id = "renamed"'), encoding="utf-8")
-    assert [cell.estimate_key for cell in cells_of(load_suite(changed), store)] == keys
-    changed.write_text(SUITE + "params = { particles = 300 }\n", encoding="utf-8")
-    different = [cell.estimate_key for cell in cells_of(load_suite(changed), store)]
+    renamed = write_suite(tmp_path, SUITE.replace('"small"', '"other"').replace('id = "pf"', 'id = "renamed"'))
+    assert [cell.estimate_key for cell in cells_of(renamed, store)] == keys
+    changed = write_suite(tmp_path, SUITE + "params = { particles = 300 }\n")
+    different = [cell.estimate_key for cell in cells_of(changed, store)]
     assert [a == b for a, b in zip(keys, different, strict=True)] == [True, True, False, False] * 2
 
 
 def test_faults_are_drawn_alike_for_every_estimator_and_leave_the_truth_alone(tmp_path):
     faults = '[[faults]]\nid = "noise"\napply = [{ kind = "rssi_noise", std_db = 6.0 }]\n'
-    (tmp_path / "faults.toml").write_text(SUITE + faults, encoding="utf-8")
-    cells = cells_of(load_suite(tmp_path / "faults.toml"), Store(tmp_path / "store"))
+    cells = cells_of(write_suite(tmp_path, SUITE + faults), Store(tmp_path / "store"))
     noisy = [cell for cell in cells if cell.fault.id == "noise" and cell.run.id == "office"]
     assert len(noisy) == 4
     assert len({cell.estimate_key for cell in cells}) == len(cells) == 16
@@ -197,8 +192,7 @@ apply = [{ kind = "rssi_noise", std_db = 6.0 }]
 
 def test_dropped_window_is_scored_by_itself(tmp_path):
     """Against the stored track: what is inside is what lies 8 s to 16 s after the first message."""
-    (tmp_path / "outages.toml").write_text(OUTAGES, encoding="utf-8")
-    suite, store = load_suite(tmp_path / "outages.toml"), Store(tmp_path / "store")
+    suite, store = write_suite(tmp_path, OUTAGES), Store(tmp_path / "store")
     results = {result.cell.fault.id: result for result in run_suite(suite, store, workers=1)}
     run = open_run(suite.runs[0], suite.folder)
     elapsed_s = (evaluation_instants(run.truth).time_ns - begin_ns(run.measurements)) / 1e9
@@ -230,8 +224,7 @@ def test_log_is_told_by_its_content_not_by_its_name(tmp_path):
     (tmp_path / "b.mcap").write_bytes((tmp_path / "a.mcap").read_bytes())
     text = SUITE.replace('scenario = "paper_office"\nduration_s = 20.0', 'mcap = "a.mcap"')
     text = text.replace('scenario = "paper_mec"\nseed = 3\nduration_s = 20.0', 'mcap = "b.mcap"')
-    (tmp_path / "logs.toml").write_text(text, encoding="utf-8")
-    cells = cells_of(load_suite(tmp_path / "logs.toml"), Store(tmp_path / "store"))
+    cells = cells_of(write_suite(tmp_path, text), Store(tmp_path / "store"))
     assert [cell.estimate_key for cell in cells[:4]] == [cell.estimate_key for cell in cells[4:]]
 
 
@@ -338,7 +331,7 @@ def test_what_is_in_the_store_is_not_tried_again(suite, tmp_path, monkeypatch):
 def test_runner_that_was_killed_leaves_a_store_that_is_gone_on_with(suite, tmp_path):
     """SIGKILL as soon as the first estimate is there."""
     store = Store(tmp_path / "store")
-    command = [sys.executable, "-m", "fusion.cli.main", "bench", "run", str(tmp_path / "small.toml")]
+    command = [sys.executable, "-m", "fusion.cli.main", "bench", "run", str(tmp_path / "suite.toml")]
     process = subprocess.Popen([*command, "--store", str(store.folder), "-j", "2"], stdout=subprocess.DEVNULL)
     while not list(store.folder.glob("scores/*/*")):
         assert process.poll() is None or process.returncode == 0
@@ -351,7 +344,7 @@ def test_runner_that_was_killed_leaves_a_store_that_is_gone_on_with(suite, tmp_p
 
 
 def test_plan_and_run_tell_what_they_did(suite, tmp_path, capsys):
-    words = [str(tmp_path / "small.toml"), "--store", str(tmp_path / "store")]
+    words = [str(tmp_path / "suite.toml"), "--store", str(tmp_path / "store")]
     assert main(["bench", "plan", *words]) == 0
     assert "2 runs x 2 estimators x 1 faults x 2 seeds = 8 cells" in capsys.readouterr().out
     assert main(["bench", "run", *words, "-j", "1"]) == 0
@@ -388,8 +381,8 @@ def test_stored_metrics_are_the_numbers_of_the_score(suite, tmp_path):
 
 def test_run_tells_why_cells_were_lost(tmp_path, capsys):
     greedy = '[[estimators]]\nid = "none"\nuse = "particle"\nparams = { particles = 1_000_000_000_000_000 }\n'
-    (tmp_path / "small.toml").write_text(SUITE + greedy, encoding="utf-8")
-    assert main(["bench", "run", str(tmp_path / "small.toml"), "--store", str(tmp_path / "store"), "-j", "1"]) == 0
+    write_suite(tmp_path, SUITE + greedy)
+    assert main(["bench", "run", str(tmp_path / "suite.toml"), "--store", str(tmp_path / "store"), "-j", "1"]) == 0
     told = capsys.readouterr().err
     assert "4 crashed, 8 ok" in told
     assert "none lost 4 of its cells: Particle failed at its start: MemoryError" in told

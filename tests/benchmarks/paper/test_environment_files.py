@@ -1,4 +1,4 @@
-"""What the paper does not give: filled in as said, told as it is, solved for without the proposed method."""
+"""Numbers that the paper does not give: filled in, stated in the world, solved for without the proposed method."""
 
 import tomllib
 
@@ -62,8 +62,8 @@ def test_half_the_floor_is_the_same_floor_at_half_the_size():
 
 
 @pytest.mark.parametrize(("filling", "wifi_db"), [(MAIN, 2.0), (OBSTRUCTIONS, 5.0)])
-def test_told_spread_of_signal_strengths_is_the_true_one(filling, wifi_db):
-    scenario = Scenario.from_table("told", filled(table(), filling, 1.0, wifi_db))
+def test_stated_spread_of_signal_strengths_is_the_true_one(filling, wifi_db):
+    scenario = Scenario.from_table("stated", filled(table(), filling, 1.0, wifi_db))
     off = []
     for seed in range(120):
         run = simulated_run(scenario, seed)
@@ -78,7 +78,7 @@ def test_told_spread_of_signal_strengths_is_the_true_one(filling, wifi_db):
 
 
 @pytest.mark.parametrize("environment", ENVIRONMENTS, ids=lambda environment: environment.short)
-def test_told_odometry_noise_covers_the_errors_it_is_told_of(environment):
+def test_stated_odometry_noise_covers_the_errors_behind_it(environment):
     """Dead reckoning on the main filling: its claimed covariance is neither a tenth nor ten times its errors."""
     scenario, nees = load_scenario(environment.scenario), []
     for seed in range(12):
@@ -113,10 +113,10 @@ def test_files_keep_their_comments_and_lead_back_to_the_same_scenarios(tmp_path,
     monkeypatch.setattr(
         environment_files, "solve_all", lambda *_: ((unknown, numbers[unknown.estimator]) for unknown in unknowns())
     )
-    told = []
-    written = write_calibrated(tmp_path, told=told.append)
+    lines = []
+    written = write_calibrated(tmp_path, report=lines.append)
     assert [path.name for path in written] == [*(f"{e.scenario}.toml" for e in ENVIRONMENTS), ALTERNATIVES_FILE]
-    assert len(told) == len(unknowns())
+    assert len(lines) == len(unknowns())
     text = (tmp_path / "paper_office.toml").read_text()
     assert "# four independently driven wheels" in text
     scenario = load_scenario(tmp_path / "paper_office.toml")

@@ -6,9 +6,9 @@ from benchmarks.runner.estimator_run import run_estimator
 from benchmarks.runner.execute import carry_out, faulty_run
 from benchmarks.runner.replay_log import one_cell, replay_cell
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite_file import load_suite
 from fusion.cli.main import main
 from logs.reader import read_run
+from tests.benchmarks.suite_files import write_suite
 
 FAULTS = {
     "drop": 'kind = "drop", topic = "wifi", p = 0.3',
@@ -39,8 +39,7 @@ SUITE = HEAD + "".join(f'[[faults]]\nid = "{name}"\napply = [{{ {table} }}]\n' f
 
 @pytest.fixture
 def suite(tmp_path):
-    (tmp_path / "again.toml").write_text(SUITE, encoding="utf-8")
-    return load_suite(tmp_path / "again.toml")
+    return write_suite(tmp_path, SUITE)
 
 
 @pytest.mark.parametrize("fault", ["clean", *FAULTS])
@@ -81,8 +80,8 @@ def test_command_compares_with_the_store_and_refuses_ids_with_the_nearest(suite,
         assert hint in capsys.readouterr().err
 
 
-def test_log_of_a_estimator_that_crashed_holds_all_that_was_measured(tmp_path, suite):
-    (tmp_path / "again.toml").write_text(HEAD.replace("gate_probability = 0.99", "gate_probability = 7.0"))
-    cell = one_cell(load_suite(tmp_path / "again.toml"), Store(tmp_path / "store"), "office", "mine")
+def test_log_of_an_estimator_that_crashed_holds_all_that_was_measured(tmp_path, suite):
+    broken = write_suite(tmp_path, HEAD.replace("gate_probability = 0.99", "gate_probability = 7.0"))
+    cell = one_cell(broken, Store(tmp_path / "store"), "office", "mine")
     assert replay_cell(cell, tmp_path / "cell.mcap") == ""
     assert read_run(tmp_path / "cell.mcap").measurements == faulty_run(cell).measurements

@@ -13,10 +13,10 @@ from benchmarks.runner.execute import carry_out
 from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite_file import load_suite
 from estimators.dead_reckoning import DeadReckoning
 from fusion import Pose
 from fusion.values import nanoseconds
+from tests.benchmarks.suite_files import write_suite
 
 SUITE = """
 [suite]
@@ -56,8 +56,7 @@ class Poisoned(DeadReckoning):
 @pytest.fixture(scope="module", params=["causal", "interp"])
 def data(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp(request.param)
-    (folder / "suite.toml").write_text(SUITE.format(reading=request.param), encoding="utf-8")
-    suite, store = load_suite(folder / "suite.toml"), Store(folder / "store")
+    suite, store = write_suite(folder, SUITE.format(reading=request.param)), Store(folder / "store")
     with fusion.registered("toy_poisoned", Poisoned):
         cells = cells_of(suite, store)
         for cell in cells:
@@ -90,13 +89,13 @@ def test_cell_that_fell_silent_keeps_its_availability_and_no_mean_of_its_answers
 
 
 def test_leaderboards_show_a_dash_and_the_run_tells_why(data):
-    for sheet in (stored.suite_leaderboard(data.results), leaderboard(data)):
-        (row,) = [row for row in sheet.rows if row[0].startswith("poisoned")]
-        shown = dict(zip(sheet.head, row, strict=True))
+    for table in (stored.suite_leaderboard(data.results), leaderboard(data)):
+        (row,) = [row for row in table.rows if row[0].startswith("poisoned")]
+        shown = dict(zip(table.head, row, strict=True))
         assert [
             text for title, text in shown.items() if title.startswith(("RMSE", "mean", "max", "heading", "ANEES"))
         ] == ["–"] * 5
-        assert sheet.rows[-1][0].startswith("poisoned")
+        assert table.rows[-1][0].startswith("poisoned")
     told = run_verb.lost(data.results)
     assert any(line.startswith(f"poisoned lost 2 of its cells: {CAUSE}") for line in told)
     assert any(line.startswith("radio lost 1 of its cells: only ") for line in told)
@@ -105,6 +104,6 @@ def test_leaderboards_show_a_dash_and_the_run_tells_why(data):
 def test_report_says_why_and_compares_no_lost_cell_with_physics(data):
     reasons = {row[0].partition("]")[0]: row[2] for row in lost(data).rows}
     assert reasons["[office poisoned clean 0"].startswith(f"`{CAUSE}")
-    for sheet in (limits(data), fixes(data)):
-        shown = {row[0]: row[1] for row in sheet.rows}
+    for table in (limits(data), fixes(data)):
+        shown = {row[0]: row[1] for row in table.rows}
         assert shown["poisoned"] == "–" != shown["wheels"]

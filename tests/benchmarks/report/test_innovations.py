@@ -14,7 +14,7 @@ from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite_file import load_suite
+from tests.benchmarks.suite_files import write_suite
 
 WIFI, RANGES = 0, 1
 N = 4000
@@ -76,8 +76,7 @@ use = "dead_reckoning"
 
 
 def test_report_tells_the_mean_nis_of_its_cells_and_marks_what_lies_outside(tmp_path):
-    (tmp_path / "suite.toml").write_text(SUITE, encoding="utf-8")
-    suite, store = load_suite(tmp_path / "suite.toml"), Store(tmp_path / "store")
+    suite, store = write_suite(tmp_path, SUITE), Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
     data = ReportData(suite, read_results(cells_of(suite, store), store), store)
     (row,) = innovations(data).rows

@@ -149,7 +149,7 @@ def test_folder_of_a_bag_is_read_anew_once_its_files_change(place, tmp_path):
         ),
         (["walk", "--world", "world.toml", *LOOK], "--worst: walk holds no ground truth"),
         (["wlak", "--suite", "suite.toml"], "the suite has no run 'wlak'; did you mean 'walk'?"),
-        (["walk", "--suite", "suite.toml", *TRUTH], "--suite says already how its bags are read"),
+        (["walk", "--suite", "suite.toml", *TRUTH], "--suite determines how its bags are read"),
         (["walk", "--world", "world.toml", *LOOK, *TRUTH, "--set", "ekf.gates=1"], "ekf has no parameter 'gates'"),
     ],
 )

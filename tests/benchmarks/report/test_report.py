@@ -28,7 +28,8 @@ from fusion.output.html import as_html
 from logs.reader import read_run
 from logs.writer import RunWriter
 from sensors.simulation.simulate import simulate
-from tests.benchmarks.browser import CHROMIUM, chromium
+from tests.benchmarks.report.browser import CHROMIUM, chromium
+from tests.benchmarks.suite_files import write_suite
 
 SUITE = """
 [suite]
@@ -56,8 +57,7 @@ apply = [{ kind = "drop", topic = "wifi" }]
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
-    (folder / "suite.toml").write_text(SUITE, encoding="utf-8")
-    run_suite(load_suite(folder / "suite.toml"), Store(folder / "store"), workers=1)
+    run_suite(write_suite(folder, SUITE), Store(folder / "store"), workers=1)
     return folder
 
 
@@ -95,7 +95,7 @@ def test_cost_is_drawn_once_it_was_measured(place, capsys):
     assert not list(cost(ReportData(suite, timed.results, Store(place / "never timed"))))
 
 
-def test_distance_from_the_limit_is_told_where_it_is_asked_for(data, plain):
+def test_distance_from_the_limit_is_shown_where_it_is_asked_for(data, plain):
     assert "Times the physical limit" not in plain
     page = report(data, limit=True)
     (row,) = re.findall(r"\| wheels \| \[([\d.]+)×\]\(#cell-\d+\) \| \[([\d.]+)×\]\(#cell-\d+\) \|", page)
@@ -114,14 +114,13 @@ def test_efficiency_of_fixes_is_that_of_the_bound_at_the_true_places(data):
     assert row[1] == f"{100.0 * ratio:.0f} %"
 
 
-def test_credibility_is_told_where_seeds_can_tell_it(data, plain, tmp_path):
+def test_credibility_is_shown_where_there_are_enough_seeds(data, plain, tmp_path):
     """Every second reading drawn anew for each seed makes radio fixes err anew; wheels do not hear of it."""
     assert "Credibility" not in plain
     assert credibility(data).rows == (("wheels", "–"), ("radio", "–"))
     text = SUITE.replace('name = "page"', 'name = "page"\nseeds = 5').replace('"wifi" }', '"wifi", p = 0.5 }')
     text = text.replace("duration_s = 20.0", "duration_s = 10.0")
-    (tmp_path / "seeds.toml").write_text(text.replace('use = "radio_only"', 'use = "ekf"'), encoding="utf-8")
-    suite, store = load_suite(tmp_path / "seeds.toml"), Store(tmp_path / "store")
+    suite, store = write_suite(tmp_path, text.replace('use = "radio_only"', 'use = "ekf"')), Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
     seeded = ReportData(suite, read_results(cells_of(suite, store), store), store)
     assert "Credibility" in report(seeded)
@@ -131,11 +130,10 @@ def test_credibility_is_told_where_seeds_can_tell_it(data, plain, tmp_path):
     assert 0.0 < abs(incl) <= nci
 
 
-def test_fault_with_windows_is_told_by_what_happened_inside(plain, tmp_path):
+def test_fault_with_windows_is_shown_by_the_errors_inside(plain, tmp_path):
     assert "While a fault lasts" not in plain
     text = SUITE.replace('topic = "wifi" }', 'topic = "wifi", windows = [[5.0, 12.0]] }')
-    (tmp_path / "windows.toml").write_text(text, encoding="utf-8")
-    suite, store = load_suite(tmp_path / "windows.toml"), Store(tmp_path / "store")
+    suite, store = write_suite(tmp_path, text), Store(tmp_path / "store")
     results = run_suite(suite, store, workers=1)
     struck = ReportData(suite, results, store)
     assert "While a fault lasts" in report(struck)
@@ -147,18 +145,17 @@ def test_fault_with_windows_is_told_by_what_happened_inside(plain, tmp_path):
     assert [row[-1] for row in rows.values()] == [row[1] for row in faults(struck).rows]
 
 
-def test_what_one_run_says_of_itself_is_told_only_where_it_is_the_only_one(plain, tmp_path):
+def test_comparison_within_a_run_is_shown_only_where_it_is_the_only_one(plain, tmp_path):
     assert "within this run" not in plain
     office, _, rest = SUITE.partition('[[runs]]\nid = "mec"')
-    (tmp_path / "one.toml").write_text(office + rest[rest.index("[[estimators]]") :], encoding="utf-8")
-    suite, store = load_suite(tmp_path / "one.toml"), Store(tmp_path / "store")
+    suite, store = write_suite(tmp_path, office + rest[rest.index("[[estimators]]") :]), Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
     page = report(ReportData(suite, read_results(cells_of(suite, store), store), store))
-    assert len(re.findall(r"- within this run, wheels beats radio by .*; says nothing of other runs", page)) == 1
-    assert "cannot tell wheels from radio" in page
+    assert len(re.findall(r"- within this run, wheels beats radio by .*; other runs may differ", page)) == 1
+    assert "inconclusive between wheels and radio" in page
 
 
-def test_radio_without_radio_is_lost_and_said_to_be(plain):
+def test_radio_without_radio_is_lost_and_listed(plain):
     assert re.search(r"\| radio \|.*∞", plain)
     assert "office radio silence 0" in plain
 
@@ -239,8 +236,8 @@ def test_numbers_lead_to_the_cells_they_come_from(data, plain):
         assert f"pos_p75 {re.match(r'.(.*?)]', row[9]).group(1)} cm" in p75 or len(data.scored_runs) % 2 == 0
         worst = entry_of(plain, row[4])
         assert f"pos_p75 {re.match(r'.(.*?)]', row[4]).group(1)} cm" in worst
-    (told,) = re.findall(r"^- .*\(\[where\]\(#(cell-\d+)\)\)$", plain, re.MULTILINE)
-    assert " radio -o " in entry_of(plain, f"[x](#{told})")
+    (anchor,) = re.findall(r"^- .*\(\[where\]\(#(cell-\d+)\)\)$", plain, re.MULTILINE)
+    assert " radio -o " in entry_of(plain, f"[x](#{anchor})")
 
 
 CLICKED = """
@@ -326,8 +323,7 @@ def grids(tmp_path_factory):
 
 
 def grid_of(folder, text):
-    (folder / "grid.toml").write_text(text, encoding="utf-8")
-    suite, store = load_suite(folder / "grid.toml"), Store(folder / "store")
+    suite, store = write_suite(folder, text), Store(folder / "store")
     run_suite(suite, store, workers=1)
     return ReportData(suite, read_results(cells_of(suite, store), store), store)
 
@@ -350,7 +346,7 @@ def test_parameters_of_a_grid_are_compared_with_the_default_tune_runs_apart(plai
     assert WITHOUT_TUNE not in page
 
 
-def test_grid_without_tune_runs_is_said_to_flatter(grids):
+def test_grid_without_tune_runs_warns_that_it_flatters(grids):
     assert WITHOUT_TUNE in report(grid_of(grids, GRID.replace('split = "tune"', "")))
 
 

@@ -31,7 +31,7 @@ from fusion import (
 )
 from fusion.cli.main import main
 from fusion.cli.options import parse_settings
-from fusion.output.tables import print_sheets
+from fusion.output.tables import print_tables
 from fusion.timeline import order
 from logs.prior import starting_prior
 from logs.run import Run
@@ -187,7 +187,7 @@ def test_answer_that_is_no_number_leaves_no_score_of_the_seconds_before_it(tmp_p
     cause = "it answers x nan m, y nan m, heading nan rad, 1 s after its first answer, so none of its answers is scored"
     assert poisoned["error"] == cause
     assert f"run: toy_poisoned diverged: {cause}" in remarks(scores)
-    print_sheets(tables(scores))
+    print_tables(tables(scores))
     (row,) = [line for line in capsys.readouterr().out.splitlines() if line.lstrip().startswith("toy_poisoned")]
     assert row.split()[:9] == ["toy_poisoned", "(diverged)", "–", "–", "∞", "∞", "∞", "–", "–"]
     assert "0.0" in row.split()[10], "the availability"
@@ -227,7 +227,7 @@ def test_log_without_truth_says_so_and_reports_the_rest(tmp_path, capsys):
     assert scores[0].status == "unscored"
     assert detailed(scores[0])["digest"]
     assert [remark for remark in remarks(scores) if "no ground truth" in remark]
-    print_sheets(tables(scores))
+    print_tables(tables(scores))
     out = capsys.readouterr().out
     assert "toy_wheels" in out
     assert "RMSE" not in out
@@ -261,7 +261,7 @@ def test_log_without_truth_shows_consistency_availability_and_time(tmp_path, cap
     assert record["nis_ranges"] == pytest.approx(error_m**2 / 0.25)
     assert (record["nis_ranges_low"] < record["nis_ranges"] < record["nis_ranges_high"]) == honest
     assert record["availability"] == pytest.approx(30 / 40)
-    print_sheets(tables([score]))
+    print_tables(tables([score]))
     (row,) = [line for line in capsys.readouterr().out.splitlines() if "toy_hears" in line]
     band = [f"{record[f'nis_ranges{end}']:.2f}" for end in ("", "_low", "_high")]
     inside = "100.0" if honest else "0.0"
@@ -271,9 +271,9 @@ def test_log_without_truth_shows_consistency_availability_and_time(tmp_path, cap
 def test_runs_without_truth_stay_out_of_the_table_of_all(tmp_path, capsys):
     logs = [write_run(tmp_path / f"{k}" / "run.mcap", truth=k > 0) for k in range(3)]
     scores = bench(logs, estimators=["toy_wheels"], workers=1)
-    print_sheets(tables(scores))
+    print_tables(tables(scores))
     assert "the 2 runs with truth: medians over runs" in capsys.readouterr().out
-    print_sheets(tables(scores[:2]))
+    print_tables(tables(scores[:2]))
     assert "medians" not in capsys.readouterr().out
 
 
@@ -293,7 +293,7 @@ def test_table_over_several_runs_has_medians_and_the_worst(tmp_path, capsys):
     results = bench(runs, estimators=["toy_drifts"], workers=1)
     rmse = [score.metrics["pos_rmse"] for score in results]
     assert rmse == sorted(rmse)
-    print_sheets(tables(results)[-1:])
+    print_tables(tables(results)[-1:])
     (row,) = [line.split() for line in capsys.readouterr().out.splitlines() if "toy_drifts" in line]
     assert row[:4] == ["toy_drifts", "3/3", f"{100 * rmse[1]:.1f}", f"{100 * rmse[2]:.1f}"]
 
@@ -306,7 +306,7 @@ def test_logs_of_one_name_are_told_apart_by_their_place(tmp_path):
 def test_table_is_in_centimetres_and_names_the_status(tmp_path, capsys):
     log = write_run(tmp_path / "run.mcap")
     scores = bench([log], estimators=["toy_wheels", "toy_dies"], settings={"toy_wheels": {"shift_m": 0.25}}, workers=1)
-    print_sheets(tables(scores))
+    print_tables(tables(scores))
     table = capsys.readouterr().out
     assert "25.0" in table
     assert "toy_dies (crashed)" in table

@@ -24,7 +24,8 @@ from benchmarks.runner.timing import measure
 from benchmarks.runner.verify import differing
 from benchmarks.runner.workers import Limits
 from fusion.cli.main import main
-from fusion.output.tables import Sheet
+from fusion.output.tables import Table
+from tests.benchmarks.suite_files import write_suite
 
 HEAD = '[suite]\nname = "verbs"\n'
 RUNS = "".join(
@@ -46,8 +47,7 @@ floor = { availability = 0.99 }
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("verbs")
-    (folder / "suite.toml").write_text(HEAD + RUNS + TAIL, encoding="utf-8")
-    suite = load_suite(folder / "suite.toml")
+    suite = write_suite(folder, HEAD + RUNS + TAIL)
     run_suite(suite, Store(folder / "store"), workers=1)
     return folder
 
@@ -84,7 +84,7 @@ def test_matrix_has_one_row_a_run_and_infinity_where_a_run_was_lost(results):
     assert np.isinf(score_matrix(own, "no_such_metric")).all()
 
 
-def test_compare_says_in_a_sentence_who_is_better_or_that_it_cannot_tell(place, results, capsys):
+def test_compare_states_in_a_sentence_who_is_better_or_that_it_is_inconclusive(place, results, capsys):
     assert main(words(place, "compare")) == 0
     said = capsys.readouterr().out
     (verdict,) = comparison(results).verdicts
@@ -120,7 +120,7 @@ def outcomes(findings):
         pytest.param([0.8] * 8, Outcome.PASS, id="better everywhere"),
         pytest.param([1.03, 1.02, 1.01, 1.02, 1.03, 1.01, 1.02, 1.03], Outcome.PASS, id="worse within the margin"),
         pytest.param([1.2, 1.3, 1.25, 1.2, 1.3, 1.2, 1.25, 1.3], Outcome.REGRESSION, id="clearly worse"),
-        pytest.param([0.7, 1.5, 0.8, 1.4, 0.9, 1.3, 0.75, 1.6], Outcome.CANNOT_TELL, id="now better, now worse"),
+        pytest.param([0.7, 1.5, 0.8, 1.4, 0.9, 1.3, 0.75, 1.6], Outcome.INCONCLUSIVE, id="now better, now worse"),
     ],
 )
 def test_gate_judges_the_whole_interval_against_the_margin(results, factors, expected):
@@ -136,7 +136,7 @@ def test_gate_holds_the_worst_cell_against_a_floor(results):
 
 @pytest.mark.parametrize(
     ("anees", "expected"),
-    [(1.0, Outcome.PASS), (3.0, Outcome.REGRESSION), (0.1, Outcome.REGRESSION), (float("nan"), Outcome.CANNOT_TELL)],
+    [(1.0, Outcome.PASS), (3.0, Outcome.REGRESSION), (0.1, Outcome.REGRESSION), (float("nan"), Outcome.INCONCLUSIVE)],
 )
 def test_gate_holds_every_cell_inside_its_own_band(results, anees, expected):
     band = {"anees": 1.0, "anees_band_low": 0.5, "anees_band_high": 1.8}
@@ -153,7 +153,7 @@ def test_a_cell_that_is_lost_now_and_was_not_before_is_a_regression(results):
 
 def test_estimator_that_the_baseline_does_not_know_cannot_be_told(results):
     known = {"wheels": baseline_of(results)["wheels"]}
-    assert Outcome.CANNOT_TELL in outcomes(judge(results, Gate(ratio={"pos_p75": 0.05}), known))
+    assert Outcome.INCONCLUSIVE in outcomes(judge(results, Gate(ratio={"pos_p75": 0.05}), known))
 
 
 def test_gate_pairs_with_its_baseline_by_run_not_by_row(results):
@@ -163,9 +163,9 @@ def test_gate_pairs_with_its_baseline_by_run_not_by_row(results):
     elsewhere = {
         name: [{**row, "run": f"{row['run']}-of-another-hall"} for row in rows] for name, rows in before.items()
     }
-    assert outcomes(judge(results, gate, elsewhere)) == {Outcome.CANNOT_TELL}
+    assert outcomes(judge(results, gate, elsewhere)) == {Outcome.INCONCLUSIVE}
     shorter = [result for result in results if result.cell.run.id != "run3"]
-    assert outcomes(judge(shorter, gate, before)) == {Outcome.CANNOT_TELL}
+    assert outcomes(judge(shorter, gate, before)) == {Outcome.INCONCLUSIVE}
     tuned = {name: [*rows, {**rows[0], "run": "tuning", "split": "tune"}] for name, rows in before.items()}
     assert outcomes(judge(results, gate, tuned)) == {Outcome.PASS}
 
@@ -185,7 +185,7 @@ def test_scores_of_zero_have_no_ratio(results):
 def test_cell_that_says_nothing_hides_behind_no_other(results, silent):
     spoilt = list(results)
     spoilt[silent] = results[silent]._replace(metrics={**results[silent].metrics, "availability": math.nan})
-    assert Outcome.CANNOT_TELL in outcomes(judge(spoilt, Gate(floor={"availability": 0.9}), None))
+    assert Outcome.INCONCLUSIVE in outcomes(judge(spoilt, Gate(floor={"availability": 0.9}), None))
     spoilt[silent] = spoilt[silent]._replace(status="crashed")
     assert Outcome.REGRESSION in outcomes(judge(spoilt, Gate(floor={"availability": 0.9}), None))
 
@@ -330,4 +330,4 @@ def test_what_an_estimator_says_breaks_no_export():
     lost = SimpleNamespace(cell=cell, status="crashed", error="red \x1b[31m & <b>\x00")
     failure = ElementTree.fromstring(as_junit(SimpleNamespace(name="s"), [lost])).find("testcase/failure")
     assert failure.text == "red ?[31m & <b>?"
-    assert rb"a\{b\}\_1 & \textbackslash{}" in as_latex(Sheet("sizes", ("a{b}_1", "\\"), ()))
+    assert rb"a\{b\}\_1 & \textbackslash{}" in as_latex(Table("sizes", ("a{b}_1", "\\"), ()))

@@ -8,15 +8,8 @@ import pytest
 from benchmarks.review.particle_clouds import MOST_CLOUDS, MOST_POINTS, CloudWatch, thinned
 from benchmarks.runner.estimator_run import run_estimator
 from fusion import Epoch, Increment, Moment, Particles, Ranges, WifiScan
-from logs.reader import read_run
-from sensors.simulation.simulate import simulate
 
 MANY = np.random.default_rng(1)
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    return read_run(simulate("office", tmp_path_factory.mktemp("clouds") / "run.mcap", duration_s=10.0))
 
 
 def test_watching_changes_nothing_and_keeps_the_cloud_of_every_scan(run):

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.limits.fix_bound import fix_error
 from benchmarks.limits.floor_plan import plan_site
 from benchmarks.limits.floor_source import choose_radio, load_site
-from benchmarks.limits.floor_tables import gain_m, record, sheets
+from benchmarks.limits.floor_tables import gain_m, record, tables
 from fusion import LogError, ParameterError, WorldError
 from fusion.cli.main import main
 from sensors.simulation.scenario import load_scenario, scenario_text
@@ -140,7 +140,7 @@ def test_two_anchors_are_planned_with_a_warning_and_fewer_are_refused(tmp_path):
     plan = plan_site(path)
     assert any("two mirror images" in remark for remark in plan.remarks)
     assert plan.losses["u1"].undefined == 1.0
-    assert sheets(plan)[1].rows[0][1:] == ("∞", "∞", "∞", "∞")
+    assert tables(plan)[1].rows[0][1:] == ("∞", "∞", "∞", "∞")
     path.write_text("[[anchors]]".join(rows[:2]))
     with pytest.raises(WorldError, match="1 anchor; a fix needs the distance to two at least"):
         plan_site(path)
@@ -164,7 +164,7 @@ def test_floor_without_any_information_is_told_and_has_no_proposal(tmp_path):
     assert any("undefined on 100.0% of the floor" in remark for remark in plan.remarks)
     assert any("no place on the floor" in remark for remark in plan.remarks)
     assert record(plan)["p95_m"] is None
-    assert sheets(plan)[1].rows[0][-1] == "–"
+    assert tables(plan)[1].rows[0][-1] == "–"
 
 
 @pytest.mark.parametrize(
@@ -207,7 +207,7 @@ def test_of_many_anchors_those_that_would_be_missed_most_are_in_the_table(tmp_pa
     rows = "".join(f'[[anchors]]\nid = "a{i}"\nposition_m = [{9 * x}, {9 * y}]\n' for i, (x, y) in enumerate(ring))
     (tmp_path / "w.toml").write_text(rows)
     plan = plan_site(tmp_path / "w.toml", step_m=2.0)
-    (table,) = [sheet for sheet in sheets(plan) if sheet.title.startswith("When one anchor falls silent")]
+    (table,) = [each for each in tables(plan) if each.title.startswith("When one anchor falls silent")]
     shown = {row[0] for row in table.rows}
     assert table.title.endswith("(the worst 12 of 20)")
     assert len(shown) == 12

@@ -10,8 +10,8 @@ from benchmarks.runner.plan import cells_of
 from benchmarks.runner.results import read_results
 from benchmarks.runner.run_suite import run_suite
 from benchmarks.runner.store import Store
-from benchmarks.runner.suite_file import load_suite
 from fusion import FusionError
+from tests.benchmarks.suite_files import write_suite
 
 distributed = pytest.importorskip("distributed")
 dask = pytest.importorskip("dask")
@@ -115,12 +115,6 @@ def lone_worker(troublesome):
         yield running
 
 
-def suite_of(text, tmp_path):
-    path = tmp_path / "suite.toml"
-    path.write_text(text, encoding="utf-8")
-    return load_suite(path)
-
-
 def with_limits(text, limits=LIMITS):
     return text.replace("seeds = 3", f"seeds = 1\n{limits}")
 
@@ -143,7 +137,7 @@ def worker_of(cluster):
 
 
 def test_cluster_gives_the_results_of_one_process_though_a_worker_is_killed(cluster, tmp_path):
-    suite = suite_of(SUITE, tmp_path)
+    suite = write_suite(tmp_path, SUITE)
     first_worker = next(iter(cluster.workers.values())).pid
     killed = []
 
@@ -159,7 +153,7 @@ def test_cluster_gives_the_results_of_one_process_though_a_worker_is_killed(clus
 
 def test_cell_that_hangs_dies_or_eats_memory_costs_itself_only(lone_worker, tmp_path):
     """To the byte what a run on this machine stores, and the Dask worker is the one it was."""
-    suite, worker = suite_of(with_limits(SUITE + TROUBLE), tmp_path), worker_of(lone_worker)
+    suite, worker = write_suite(tmp_path, with_limits(SUITE + TROUBLE)), worker_of(lone_worker)
     here, there = Store(tmp_path / "here"), Store(tmp_path / "there")
     found = run_suite(suite, there, dask=lone_worker.scheduler_address)
     lost = {"hangs": "timeout", "eats": "oom", "exits": "crashed", "faults": "crashed"}
@@ -172,7 +166,7 @@ def test_cell_that_hangs_dies_or_eats_memory_costs_itself_only(lone_worker, tmp_
 
 def test_interrupted_run_leaves_no_process_and_a_store_that_is_gone_on_with(lone_worker, tmp_path):
     text, store, address = SUITE + TROUBLE, Store(tmp_path / "store"), lone_worker.scheduler_address
-    patient = suite_of(with_limits(text, "limits = { wall_s = 3600.0, rss_mb = 400.0 }"), tmp_path)
+    patient = write_suite(tmp_path, with_limits(text, "limits = { wall_s = 3600.0, rss_mb = 400.0 }"))
     told = []
 
     def interrupt(done, total, what):
@@ -184,7 +178,7 @@ def test_interrupted_run_leaves_no_process_and_a_store_that_is_gone_on_with(lone
     assert told == [(1, 6)]
     assert worker_of(lone_worker).children() == []
     assert "hangs" not in statuses(read_results(cells_of(patient, store), store))
-    resumed = run_suite(suite_of(with_limits(text), tmp_path), store, dask=address)
+    resumed = run_suite(write_suite(tmp_path, with_limits(text)), store, dask=address)
     assert sorted(statuses(resumed).values()) == ["crashed", "crashed", "ok", "ok", "oom", "timeout"]
 
 
@@ -192,17 +186,17 @@ def test_cell_whose_dask_worker_died_is_not_done_rather_than_crashed(lone_worker
     """What the cluster loses says nothing about the estimator; and a cell does not outlive its Dask worker."""
     store, pid_file = Store(tmp_path / "store"), tmp_path / "pid"
     use = f'use = "kills_its_parent"\nparams = {{ pid_file = "{pid_file}" }}\n'
-    suite = suite_of(f'{with_limits(SUITE, "")}\n[[estimators]]\nid = "killer"\n{use}', tmp_path)
+    suite = write_suite(tmp_path, f'{with_limits(SUITE, "")}\n[[estimators]]\nid = "killer"\n{use}')
     with pytest.raises(FusionError, match="died with them"):
         run_suite(suite, store, dask=lone_worker.scheduler_address)
     assert "killer" not in statuses(read_results(cells_of(suite, store), store))
     with suppress(psutil.NoSuchProcess):
         psutil.Process(int(pid_file.read_text("ascii"))).wait(60.0)
-    healthy = suite_of(with_limits(SUITE, ""), tmp_path)
+    healthy = write_suite(tmp_path, with_limits(SUITE, ""))
     assert statuses(run_suite(healthy, store, dask=lone_worker.scheduler_address)) == {"wheels": "ok", "pf": "ok"}
 
 
 def test_scheduler_that_does_not_answer_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr("benchmarks.runner.dask_cluster.PATIENCE_S", 1.0)
     with pytest.raises(FusionError, match="no scheduler answers"):
-        run_suite(suite_of(SUITE, tmp_path), Store(tmp_path / "store"), dask="tcp://127.0.0.1:9")
+        run_suite(write_suite(tmp_path, SUITE), Store(tmp_path / "store"), dask="tcp://127.0.0.1:9")
