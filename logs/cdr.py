@@ -7,8 +7,22 @@ Strings and sequences carry their length first; a string ends with a zero byte t
 from __future__ import annotations
 
 import struct
+from functools import cache, lru_cache
+from typing import Any
 
 HEADER = b"\x00\x01\x00\x00"
+SIZES = {code: struct.calcsize("<" + code) for code in "?bBhHiIqQfd"}
+"""Bytes of a number, by its `struct` letter."""
+
+
+@cache
+def _fields(codes: str) -> struct.Struct:
+    return struct.Struct(f"<{codes}")
+
+
+@lru_cache(maxsize=1024)
+def _layout(code: str, count: int) -> struct.Struct:
+    return struct.Struct(f"<{count}{code}")
 
 
 class Packer:
@@ -21,9 +35,8 @@ class Packer:
         """Numbers of one type, by their `struct` letter. None at all take no room, not even for alignment."""
         if not values:
             return self
-        size = struct.calcsize("<" + code)
-        self._bytes += b"\0" * (-len(self._bytes) % size)
-        self._bytes += struct.pack(f"<{len(values)}{code}", *values)
+        self._bytes += b"\0" * (-len(self._bytes) % SIZES[code])
+        self._bytes += _layout(code, len(values)).pack(*values)
         return self
 
     def text(self, value: str) -> Packer:
@@ -51,11 +64,17 @@ class Unpacker:
         """``count`` numbers of one type."""
         if count == 0:
             return ()
-        size = struct.calcsize("<" + code)
-        self._at += -self._at % size
-        values = struct.unpack_from(f"<{count}{code}", self._body, self._at)
-        self._at += count * size
-        return values
+        layout = _layout(code, count)
+        at = self._at + -self._at % SIZES[code]
+        self._at = at + layout.size
+        return layout.unpack_from(self._body, at)
+
+    def fields(self, codes: str) -> tuple[Any, ...]:
+        """Numbers of several types, by their letters, between which no padding can be: none is larger than the one before."""
+        layout = _fields(codes)
+        at = self._at + -self._at % SIZES[codes[0]]
+        self._at = at + layout.size
+        return layout.unpack_from(self._body, at)
 
     @property
     def left(self) -> int:
@@ -73,4 +92,10 @@ class Unpacker:
         if len(encoded) != length:
             raise ValueError("a string is cut off")
         self._at += length
-        return encoded[:-1].decode()
+        return _decoded(encoded[:-1])
+
+
+@lru_cache(maxsize=1024)
+def _decoded(encoded: bytes) -> str:
+    """The text; the same few names stand in every message."""
+    return encoded.decode()

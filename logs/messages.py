@@ -53,7 +53,7 @@ def stamped(time_ns: int, frame_id: str) -> Packer:
 
 def take_header(cursor: Unpacker) -> tuple[int, str]:
     """Time [ns] and frame of a std_msgs/Header."""
-    sec, nanosec = cursor.whole("i"), cursor.whole("I")
+    sec, nanosec = cursor.fields("iI")
     return sec * NANOSECONDS + nanosec, cursor.text()
 
 
@@ -133,9 +133,7 @@ def _encode_odometry(value: Odometry) -> bytes:
 def _decode_odometry(data: bytes, seq: int) -> Odometry:
     cursor = Unpacker(data)
     time_ns, sensor = take_header(cursor)
-    from_ns = cursor.whole("q")
-    distance_m, turn_rad = cursor.take("d", 2)
-    return Odometry(time_ns, sensor, seq, from_ns, distance_m, turn_rad, bool(cursor.whole("?")))
+    return Odometry(time_ns, sensor, seq, *cursor.fields("qdd?"))
 
 
 def _encode_gyro(value: Gyro) -> bytes:
