@@ -53,12 +53,12 @@ def oracle_a():
     t = 0.1 * np.arange(1000)
     x, y = 5.0 * np.sin(0.1 * t), 2.5 * np.sin(0.2 * t)
     heading = np.arctan2(0.5 * np.cos(0.2 * t), 0.5 * np.cos(0.1 * t))
-    said = (
+    estimate = (
         x + 0.30 + 0.05 * np.sin(1.7 * t),
         y - 0.10 + 0.05 * np.cos(2.3 * t),
         wrap_angles(heading + 0.02 * np.sin(0.9 * t)),
     )
-    return _instants_of(t, x, y, heading), _answers_of(*said, np.diag([0.04, 0.01, 0.0001]))
+    return _instants_of(t, x, y, heading), _answers_of(*estimate, np.diag([0.04, 0.01, 0.0001]))
 
 
 @pytest.fixture
@@ -70,8 +70,8 @@ def oracle_c():
     noise_x, noise_y = r.normal(0, 0.02, n), r.normal(0, 0.02, n)
     if noise_x[:2].tolist() != [0.002514604421867866, -0.0026420972658260378]:
         pytest.skip("this numpy draws other numbers than the one the reference was made with")
-    said = np.cos(yaw) * x - np.sin(yaw) * y + 1.5 + noise_x, np.sin(yaw) * x + np.cos(yaw) * y + noise_y
-    return _instants_of(0.1 * np.arange(n), x, y, np.zeros(n)), _answers_of(*said, np.full(n, yaw))
+    estimate = np.cos(yaw) * x - np.sin(yaw) * y + 1.5 + noise_x, np.sin(yaw) * x + np.cos(yaw) * y + noise_y
+    return _instants_of(0.1 * np.arange(n), x, y, np.zeros(n)), _answers_of(*estimate, np.full(n, yaw))
 
 
 @pytest.fixture

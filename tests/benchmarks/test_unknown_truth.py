@@ -63,14 +63,14 @@ def test_headings_that_are_not_known_spoil_nothing(tmp_path, capsys, unknown, te
     assert main(["info", str(log)]) == 0
     assert f"the heading known at {known or 'none'} of them" in capsys.readouterr().out
 
-    found, told = records(log, capsys)
+    found, printed = records(log, capsys)
     for record in found:
         assert (record["estimator"], record["status"], record["error"]) == (record["estimator"], "ok", None)
         assert record["pos_rmse"] < 0.2
         assert record["head_n"] == known
         assert (record["head_rmse"] is None) == (known == 0)
         assert (record["head_rmse"] or 0.0) < 0.1
-    assert (f"the true heading is known at {known} of {COUNT} instants" in told) == (known > 0)
+    assert (f"the true heading is known at {known} of {COUNT} instants" in printed) == (known > 0)
 
     assert main(["export", str(log), "--csv", "-o", str(tmp_path / "again")]) == 0
     again = imported(tmp_path / "again", tmp_path / "again.mcap")
@@ -89,9 +89,9 @@ def test_positions_that_are_not_known_are_left_out_and_counted(tmp_path, capsys,
         NANOSECONDS // 2,
         pytest.approx(tuple(DRIVE.pose(NANOSECONDS // 2))),
     )
-    found, told = records(tmp_path / "walk.mcap", capsys)
+    found, printed = records(tmp_path / "walk.mcap", capsys)
     assert [(record["status"], record["n"]) for record in found] == [("ok", COUNT - 3.0)] * len(ESTIMATORS)
-    assert sentence in told
+    assert sentence in printed
     assert main(["info", str(tmp_path / "walk.mcap")]) == 0
     assert sentence in capsys.readouterr().out
 
@@ -100,9 +100,9 @@ def test_truth_without_any_position_is_none(tmp_path, capsys):
     folder = bundle(tmp_path / "walk", lambda _, row: [row[0], "nan", "", row[3]])
     run = imported(folder, tmp_path / "walk.mcap")
     assert (run.truth, run.prior) == (None, None)
-    found, told = records(tmp_path / "walk.mcap", capsys)
+    found, printed = records(tmp_path / "walk.mcap", capsys)
     assert {record["status"] for record in found} == {"unscored"}
-    assert f"none of the {COUNT} true poses has a position" in told
+    assert f"none of the {COUNT} true poses has a position" in printed
 
 
 def test_suite_and_review_take_such_a_run(tmp_path, capsys):
@@ -111,9 +111,9 @@ def test_suite_and_review_take_such_a_run(tmp_path, capsys):
     (tmp_path / "suite.toml").write_text(SUITE, encoding="utf-8")
     words = [str(tmp_path / "suite.toml"), "--store", str(tmp_path / "store")]
     assert main(["bench", "run", *words, "-j", "1"]) == 0
-    told = capsys.readouterr().err
-    assert "2 ok" in told
-    assert f"walk: the true heading is known at {COUNT - 6} of {COUNT} instants" in told
+    printed = capsys.readouterr().err
+    assert "2 ok" in printed
+    assert f"walk: the true heading is known at {COUNT - 6} of {COUNT} instants" in printed
     scene = tmp_path / "review.rrd"
     assert (
         main(["review", str(tmp_path / "walk.mcap"), "--estimators", "ekf", "--save", str(scene), "--worst", "1"]) == 0

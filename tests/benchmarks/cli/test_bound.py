@@ -69,7 +69,7 @@ def test_kind_of_radio_is_the_one_in_use(tmp_path, hall):
     assert load_site(bare).radios == set()
 
 
-def test_where_the_site_does_not_decide_signal_strength_is_taken_and_told():
+def test_where_the_site_does_not_decide_signal_strength_is_taken_with_a_remark():
     assert choose_radio(frozenset({"range"}))[0] == "range"
     for undecided in (frozenset(), frozenset({"rssi", "range"})):
         radio, why = choose_radio(undecided)
@@ -102,16 +102,19 @@ def test_more_scans_lower_the_error_and_an_unknown_offset_raises_it(hall):
     assert plan_site(hall, step_m=1.0, offset_std=math.inf).spread.median_m > once
 
 
-def test_record_is_strict_json_and_says_what_the_tables_say(hall, tmp_path, capsys):
+def test_record_is_strict_json_and_holds_what_the_tables_show(hall, tmp_path, capsys):
     output = tmp_path / "deep" / "plan.json"
     assert main(["bound", str(hall), "--add", "--move", "--step", "1", "--json", str(output)]) == 0
-    told, plan = json.loads(output.read_text()), plan_site(hall, add=True, move=True, step_m=1.0)
-    assert told == json.loads(json.dumps(record(plan), allow_nan=False))
-    assert [(each["kind"], each["anchor"] == "new") for each in told["proposals"]] == [("add", True), ("move", False)]
-    assert [each["p95_gain_m"] for each in told["proposals"]] == [gain_m(plan, each) for each in plan.proposals]
-    assert np.array(told["error_m"]).shape == (len(told["y_m"]), len(told["x_m"]))
+    stored, plan = json.loads(output.read_text()), plan_site(hall, add=True, move=True, step_m=1.0)
+    assert stored == json.loads(json.dumps(record(plan), allow_nan=False))
+    assert [(each["kind"], each["anchor"] == "new") for each in stored["proposals"]] == [
+        ("add", True),
+        ("move", False),
+    ]
+    assert [each["p95_gain_m"] for each in stored["proposals"]] == [gain_m(plan, each) for each in plan.proposals]
+    assert np.array(stored["error_m"]).shape == (len(stored["y_m"]), len(stored["x_m"]))
     screen = capsys.readouterr().out
-    assert f"{told['p95_m']:.2f}" in screen
+    assert f"{stored['p95_m']:.2f}" in screen
     assert "one more anchor at" in screen
     assert "u1" in screen
 
@@ -156,7 +159,7 @@ def test_anchors_on_one_line_are_refused_by_name(tmp_path, capsys):
     assert "u1, u2, u3 lie on one line" in capsys.readouterr().err
 
 
-def test_floor_without_any_information_is_told_and_has_no_proposal(tmp_path):
+def test_floor_without_any_information_is_reported_and_has_no_proposal(tmp_path):
     path = tmp_path / "flat.toml"
     path.write_text(HALL + "[radio]\nreference_distance_m = 500.0\n")
     plan = plan_site(path, add=True, step_m=2.0)
@@ -197,7 +200,7 @@ def test_source_that_is_not_there_is_named(tmp_path):
         plan_site(broken)
 
 
-def test_record_that_cannot_be_written_is_told(hall, tmp_path, capsys):
+def test_record_that_cannot_be_written_is_reported(hall, tmp_path, capsys):
     assert main(["bound", str(hall), "--step", "2", "--json", str(tmp_path)]) == 1
     assert "cannot be written" in capsys.readouterr().err
 

@@ -1,4 +1,4 @@
-"""A replay says the same twice, and proves it."""
+"""A replay gives the same twice, and proves it."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Every fault does what it says to the messages it names, and to nothing else; chance is the same for everybody."""
+"""Every fault does what it is for to the messages it names, and to nothing else; chance is the same for all."""
 
 import itertools
 import math
@@ -124,7 +124,7 @@ def test_every_kind_can_be_read_and_changes_the_run(kind):
 
 
 @pytest.mark.parametrize(
-    ("table", "told"),
+    ("table", "message"),
     [
         ({"kind": "dorp", "topic": "wifi"}, r"faults\[0\]: no fault named 'dorp' is installed; did you mean 'drop'\?"),
         ({"topic": "wifi"}, r"faults\[0\]: kind is missing; add it, one of bad_start"),
@@ -147,13 +147,13 @@ def test_every_kind_can_be_read_and_changes_the_run(kind):
         ({"kind": "kidnap", "from_s": 9, "until_s": 5}, "until_s: 5.0 must be later than from_s, 9.0"),
     ],
 )
-def test_table_that_means_nothing_is_refused_with_a_hint(table, told):
-    with pytest.raises(ParameterError, match=told):
+def test_table_that_means_nothing_is_refused_with_a_hint(table, message):
+    with pytest.raises(ParameterError, match=message):
         read_fault(table, "faults[0]")
 
 
 @pytest.mark.parametrize(
-    ("fault", "told"),
+    ("fault", "message"),
     [
         (Drop("command"), r"no topic 'command'; it has gyro, odom, ranges, wifi"),
         (Drop("wifi", "ap9"), r"no 'ap9' on wifi; it has ap1, ap2, ap3, wifi"),
@@ -164,8 +164,8 @@ def test_table_that_means_nothing_is_refused_with_a_hint(table, told):
         (Freeze("middle"), r"no wheel 'middle'; its skid_steer drive has front_left, front_right"),
     ],
 )
-def test_what_the_run_does_not_have_is_refused_with_what_it_has(fault, told):
-    with pytest.raises(ParameterError, match=rf"fault 'f' \({fault.kind}\) on run 'office-3': the run has {told}"):
+def test_what_the_run_does_not_have_is_refused_with_what_it_has(fault, message):
+    with pytest.raises(ParameterError, match=rf"fault 'f' \({fault.kind}\) on run 'office-3': the run has {message}"):
         with_faults(fault)
 
 
@@ -315,7 +315,7 @@ def test_messages_outside_the_windows_are_never_touched(kind):
         (Clock("gyro", offset_s=1.0), ()),
     ],
 )
-def test_fault_tells_when_it_lasts_unless_that_is_always(fault, lasts):
+def test_fault_states_when_it_lasts_unless_that_is_always(fault, lasts):
     assert fault.lasts == lasts
 
 
@@ -351,7 +351,7 @@ def test_dropped_topic_is_gone_in_its_windows():
     assert with_faults(GyroDrop(WINDOWS)).measurements == with_faults(Drop("gyro", windows=WINDOWS)).measurements
 
 
-def test_dropped_anchor_is_gone_and_the_others_are_heard():
+def test_dropped_anchor_is_gone_and_the_others_are_received():
     faulty = with_faults(Drop("wifi", "ap2", windows=((0.0, 9.0),)))
     for before, after in zip(of_kind(RUN, WifiScan), of_kind(faulty, WifiScan), strict=True):
         expected = tuple(r for r in before.readings if r.anchor != "ap2" or not is_in(before, ((0.0, 9.0),)))
@@ -359,7 +359,7 @@ def test_dropped_anchor_is_gone_and_the_others_are_heard():
 
 
 def test_scan_of_one_anchor_goes_with_it():
-    """Every message of the simulated ranging tells of one anchor."""
+    """Every message of the simulated ranging holds one anchor."""
     faulty = with_faults(Drop("ranges", "ap1"))
     assert of_kind(faulty, Ranges) == [m for m in of_kind(RUN, Ranges) if m.readings[0].anchor != "ap1"]
 
@@ -368,7 +368,7 @@ def test_sensor_can_be_dropped_by_its_name():
     assert of_kind(with_faults(Drop("wifi", "wifi")), WifiScan) == []
 
 
-def test_scan_that_heard_nothing_is_kept():
+def test_scan_without_readings_is_kept():
     silent = replace(of_kind(RUN, WifiScan)[0], readings=())
     run = replace(RUN, measurements=(*RUN.measurements, replace(silent, time_ns=RUN.measurements[-1].time_ns + 1)))
     assert with_faults(Drop("wifi", "ap1"), run=run).measurements[-1].readings == ()
@@ -380,7 +380,7 @@ def test_share_of_messages_that_are_lost_is_the_probability():
     assert abs(left / count - 0.7) < 3.0 * math.sqrt(0.3 * 0.7 / count)
 
 
-def test_burst_losses_are_as_many_and_as_long_as_their_probabilities_say():
+def test_burst_losses_are_as_many_and_as_long_as_by_their_probabilities():
     """In the long run the share lost is p_enter / (p_enter + p_exit) = 0.2, the mean burst 1 / p_exit = 4."""
     gyros = [Gyro(nanoseconds(0.01 * i), "gyro", i, 0.0) for i in range(20_000)]
     faulty = with_faults(Drop("gyro", p_enter=0.0625, p_exit=0.25), run=replace(RUN, measurements=tuple(gyros)))
@@ -461,7 +461,7 @@ def test_increments_still_meet_under_a_wrong_clock():
     assert all(one.time_ns == other.from_ns for one, other in itertools.pairwise(odometry))
 
 
-def test_windows_keep_to_the_true_time_whatever_the_clock_says():
+def test_windows_keep_to_the_true_time_whatever_the_clock_shows():
     shifted = with_faults(Clock("gyro", offset_s=3.0), GyroDrop(WINDOWS))
     assert [m.seq for m in of_kind(shifted, Gyro)] == [m.seq for m in of_kind(RUN, Gyro) if not is_in(m)]
 

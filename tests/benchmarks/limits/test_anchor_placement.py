@@ -97,7 +97,7 @@ def test_one_more_anchor_is_what_the_world_file_would_make_of_it():
 
 
 def test_anchor_in_the_wrong_place_is_the_one_to_move():
-    """Three stand around the floor, the fourth beside the first: it says nothing new there."""
+    """Three stand around the floor, the fourth beside the first: it adds no information there."""
     world = floor(((0, 0), (10, 0), (0, 10), (0.1, 0.1)), ranging={"scale_std": 0.0})
     found = best_move(world, RANGES, places_of(world))
     assert found.anchor.id in {"ap0", "ap3"}

@@ -51,7 +51,7 @@ def test_anchors_axes_colours_and_proposals_are_labelled(plan):
     assert any(text.endswith(" m") and text[0].isdigit() for text in shown), "contours are labelled"
 
 
-def test_names_of_a_hundred_anchors_can_be_told_apart(tmp_path):
+def test_names_of_a_hundred_anchors_can_be_distinguished(tmp_path):
     table = "".join(
         f'[[anchors]]\nid = "a{i:02d}"\nposition_m = [{4.0 * (i % 10)}, {3.0 * (i // 10) + 0.7 * (i % 3)}]\n'
         for i in range(100)
@@ -104,12 +104,12 @@ def test_floor_of_one_cell_is_drawn(tmp_path):
     assert (tmp_path / "map.png").stat().st_size > 10_000
 
 
-def test_without_matplotlib_the_remedy_is_told_before_any_work(monkeypatch, tmp_path, capsys):
+def test_without_matplotlib_the_remedy_is_reported_before_any_work(monkeypatch, tmp_path, capsys):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert main(["bound", "no such site", "--png", str(tmp_path / "map.png")]) == 1
     assert "pip install 'fusion-localization[plots]'" in capsys.readouterr().err
 
 
-def test_picture_that_cannot_be_written_is_told(plan, tmp_path):
+def test_picture_that_cannot_be_written_is_reported(plan, tmp_path):
     with pytest.raises(FusionError, match="cannot be written"):
         site_picture.draw(plan, tmp_path)

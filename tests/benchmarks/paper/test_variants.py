@@ -67,7 +67,7 @@ def test_middle_of_the_floor_becomes_the_origin():
     assert (bounds.x_min, bounds.y_min) == (-bounds.x_max, -bounds.y_max)
 
 
-def test_gyro_is_there_or_not_and_the_world_says_which():
+def test_gyro_is_there_or_not_and_the_world_states_which():
     whole = simulated_run(load_scenario("paper_office"), 0)
     assert any(isinstance(item, Gyro) for item in whole.measurements)
     assert not any(isinstance(item, Gyro) for item in without_gyro(whole).measurements)

@@ -9,7 +9,7 @@ CHROMIUM = pytest.mark.skipif(shutil.which("chromium") is None, reason="no chrom
 
 
 def chromium(folder, *words):
-    """What it printed; what a page tells the console is in its standard error, after the word CONSOLE."""
+    """What it printed; what a page writes to the console is in its standard error, after the word CONSOLE."""
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr"]
     command = ["chromium", *options, f"--user-data-dir={folder}/profile", *words]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)

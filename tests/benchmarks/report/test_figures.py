@@ -151,7 +151,7 @@ def test_point_of_a_distribution_leads_to_the_instant_with_that_error(data):
         assert error_cm == pytest.approx(100.0 * series.error_m[at], rel=0.01)
 
 
-def test_consistency_draws_what_the_tables_say_and_crosses_what_lies_outside(data):
+def test_consistency_draws_what_the_tables_show_and_crosses_what_lies_outside(data):
     answers, readings = consistency(data)
     cells = [one for one in data.results if one.cell.run.split == "test" and np.isfinite(one.metrics["anees"])]
     assert {anchor for anchor, *_ in targets_of(answers)} == {data.anchor(one) for one in cells}

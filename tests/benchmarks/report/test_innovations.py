@@ -33,26 +33,26 @@ def innovation():
 
 
 def test_mean_of_an_honest_filter_lies_in_the_band_of_as_many_readings(innovation):
-    told = mean_nis(fates_of(innovation**2, WIFI, np.arange(N) % 2))
-    assert told.keys() == {"wifi"}
-    assert told["wifi"].mean == pytest.approx(np.mean(innovation**2), rel=1e-12)
-    assert told["wifi"].is_inside
+    nis = mean_nis(fates_of(innovation**2, WIFI, np.arange(N) % 2))
+    assert nis.keys() == {"wifi"}
+    assert nis["wifi"].mean == pytest.approx(np.mean(innovation**2), rel=1e-12)
+    assert nis["wifi"].is_inside
     # The normal approximation of chi-square: the mean of N squares has the variance 2 / N.
-    assert told["wifi"].high - 1.0 == pytest.approx(1.96 * np.sqrt(2.0 / N), rel=0.25)
+    assert nis["wifi"].high - 1.0 == pytest.approx(1.96 * np.sqrt(2.0 / N), rel=0.25)
 
 
 @pytest.mark.parametrize("claimed", [0.25, 4.0])
 def test_claims_that_are_wrong_by_four_lie_outside(innovation, claimed):
-    told = mean_nis(fates_of(innovation**2 / claimed, RANGES, np.zeros(N, dtype=int)))["ranges"]
-    assert not told.is_inside
-    assert told.mean > told.high if claimed < 1.0 else told.mean < told.low
+    nis = mean_nis(fates_of(innovation**2 / claimed, RANGES, np.zeros(N, dtype=int)))["ranges"]
+    assert not nis.is_inside
+    assert nis.mean > nis.high if claimed < 1.0 else nis.mean < nis.low
 
 
 def test_readings_that_repeat_each_other_prove_less(innovation):
     alike = np.repeat(innovation[: N // 20], 20)
-    told = mean_nis(fates_of(alike**2, WIFI, np.zeros(N, dtype=int)))["wifi"]
+    nis = mean_nis(fates_of(alike**2, WIFI, np.zeros(N, dtype=int)))["wifi"]
     white = mean_nis(fates_of(innovation**2, WIFI, np.zeros(N, dtype=int)))["wifi"]
-    assert told.high - told.low > 3.0 * (white.high - white.low)
+    assert nis.high - nis.low > 3.0 * (white.high - white.low)
 
 
 def test_readings_without_a_prediction_have_no_row():
@@ -75,7 +75,7 @@ use = "dead_reckoning"
 """
 
 
-def test_report_tells_the_mean_nis_of_its_cells_and_marks_what_lies_outside(tmp_path):
+def test_report_lists_the_mean_nis_of_its_cells_and_marks_what_lies_outside(tmp_path):
     suite, store = write_suite(tmp_path, SUITE), Store(tmp_path / "store")
     run_suite(suite, store, workers=1)
     data = ReportData(suite, read_results(cells_of(suite, store), store), store)

@@ -350,7 +350,7 @@ def test_grid_without_tune_runs_warns_that_it_flatters(grids):
     assert WITHOUT_TUNE in report(grid_of(grids, GRID.replace('split = "tune"', "")))
 
 
-def test_suite_of_nothing_but_tune_runs_says_so(grids):
+def test_suite_of_nothing_but_tune_runs_warns_of_it(grids):
     _, head, rest = GRID.partition("[[estimators]]")
     runs = GRID[: GRID.index('[[runs]]\nid = "mec"')]
     assert "**All runs are for tuning**" in report(grid_of(grids, runs + head + rest))
@@ -370,7 +370,7 @@ params = { particles = 1_000_000_000_000_000 }
 """
 
 
-def test_estimator_that_crashed_everywhere_leaves_a_page_that_says_why_and_draws_nothing(tmp_path):
+def test_estimator_that_crashed_everywhere_leaves_a_page_that_states_why_and_draws_nothing(tmp_path):
     page = report(grid_of(tmp_path, LOST))
     ((cell, status, why),) = rows_of(page, "Lost cells")
     assert (status, cell) == ("crashed", "[office broken clean 0](#cell-0)")

@@ -90,10 +90,11 @@ def made_up_run(run: Run, number: int) -> Reviewed:
         if isinstance(measurement, Ranges):
             head = measurement.time_ns, measurement.sensor, measurement.seq
             good, bad = (Decision.USED, Reason.OK, 1.0), (Decision.REJECTED, Reason.GATE, 0.0)
-            told = [bad if (k + i) % 20 == 0 else good for i in range(len(ANCHORS))]
+            judged = [bad if (k + i) % 20 == 0 else good for i in range(len(ANCHORS))]
             nis = 0.5 + (k % 7)
             fates = tuple(
-                Fate(*head, r.anchor, *what, 0.1, 0.04, nis) for r, what in zip(measurement.readings, told, strict=True)
+                Fate(*head, r.anchor, *what, 0.1, 0.04, nis)
+                for r, what in zip(measurement.readings, judged, strict=True)
             )
         updates.append(Update(measurement, Estimate(measurement.time_ns, pose, covariance), fates))
     clouds = watched(run).clouds() if number < WITH_PARTICLES else None

@@ -64,7 +64,7 @@ def test_misspelt_anchor_is_refused_with_the_nearest(tmp_path):
         without_anchor(run, "kitchn")
 
 
-def test_anchor_of_the_world_that_was_never_heard_is_refused(run):
+def test_anchor_of_the_world_that_was_never_received_is_refused(run):
     with pytest.raises(ParameterError, match=r"--without c: .* holds no reading of that anchor; known: a, b"):
         without_anchor(run, "c")
 

@@ -1,4 +1,4 @@
-"""States and events of an estimator, told from its estimates and fates."""
+"""States and events of an estimator, derived from its estimates and fates."""
 
 import numpy as np
 
@@ -30,8 +30,8 @@ def told_states(*updates):
 
 
 def told_events(*updates):
-    told = events(updates, EstimateColumns.of_updates(updates), FateColumns.of(updates))
-    return list(zip((told.time_ns // SECOND_NS).tolist(), told.level, told.text, strict=True))
+    happened = events(updates, EstimateColumns.of_updates(updates), FateColumns.of(updates))
+    return list(zip((happened.time_ns // SECOND_NS).tolist(), happened.level, happened.text, strict=True))
 
 
 def test_one_reading_taken_is_accept_and_none_taken_is_reject():
@@ -51,7 +51,7 @@ def test_estimator_without_a_position_is_init_at_first_and_lost_later():
     assert told_states(*updates) == [(1, State.INIT), (2, State.ACCEPT), (3, State.LOST), (4, State.ACCEPT)]
 
 
-def test_estimator_that_says_it_is_lost_is_lost():
+def test_estimator_that_reports_it_is_lost_is_lost():
     assert told_states(update(1, TAKEN, p_lost=0.2), update(2, TAKEN, p_lost=0.9)) == [
         (1, State.ACCEPT),
         (2, State.LOST),
@@ -74,12 +74,12 @@ def test_rejected_readings_are_warnings_with_their_nis():
     assert told_events(update(3, GATED, nis=18.52)) == [(3, "WARN", "ap0 rejected: gate, NIS 18.5")]
 
 
-def test_late_readings_are_told():
+def test_late_readings_are_reported():
     late = update(2, (Decision.LATE, Reason.TOO_LATE))
     assert told_events(late) == [(2, "INFO", "ap0 late: too late")]
 
 
-def test_resets_and_losses_are_told_once_each():
+def test_resets_and_losses_are_reported_once_each():
     jump = {"reset_count": 1, "reset_delta": Pose(3.0, 4.0, 0.0)}
     updates = update(1), update(2, valid=False), update(3, valid=False), update(4, **jump), update(5, **jump)
     assert told_events(*updates) == [

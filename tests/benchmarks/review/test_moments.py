@@ -1,4 +1,4 @@
-"""Where an estimator was worst, and what is said to be the cause."""
+"""Where an estimator was worst, and the causes that are listed."""
 
 import dataclasses
 import shlex
@@ -108,12 +108,12 @@ def test_single_rejected_reading_is_no_cause(tmp_path):
     assert moment.causes == ("nothing unusual in the readings",)
 
 
-def test_too_few_anchors_are_told_with_their_time(tmp_path):
+def test_too_few_anchors_are_reported_with_their_time(tmp_path):
     moment = moment_of(tmp_path, lambda s: all_taken(s)[: 2 if s > 26 else 3])
     assert moment.causes == ("fewer than 3 anchors for 4 s",)
 
 
-def test_anchors_heard_one_after_the_other_within_a_second_count_together(tmp_path):
+def test_anchors_received_one_after_the_other_within_a_second_count_together(tmp_path):
     truth = [Truth(k * SECOND_NS // 4, 0.0, 0.0, 0.0) for k in range(200)]
     assert "fewer" not in " ".join(one_anchor_at_a_time(tmp_path, truth).causes)
 
@@ -131,7 +131,7 @@ def one_anchor_at_a_time(tmp_path, truth):
     return worst_moments(run, drawing, 0, 1)[0]
 
 
-def test_silence_of_the_radio_and_of_the_odometry_are_told(tmp_path):
+def test_silence_of_the_radio_and_of_the_odometry_are_reported(tmp_path):
     moment = moment_of(tmp_path, lambda s: [] if 20 < s <= 30 else all_taken(s))
     assert moment.causes == ("no radio for 10 s",)
     moment = moment_of(tmp_path, all_taken, odometry=lambda s: not 26 < s <= 30)
@@ -143,14 +143,14 @@ def test_believed_reading_far_off_is_named(tmp_path):
     assert moment.causes == ("a taken with NIS 30.0",)
 
 
-def test_reset_and_missing_position_are_told(tmp_path):
+def test_reset_and_missing_position_are_reported(tmp_path):
     assert moment_of(tmp_path, all_taken, reset_count=lambda s: int(s > 28)).causes == ("belief replaced",)
     outage = moment_of(tmp_path, all_taken, valid=lambda s: s != 35)
     assert (outage.at_s, outage.error_m) == (35.0, np.inf)
     assert "no valid position" in outage.causes
 
 
-def test_method_without_radio_says_so(tmp_path):
+def test_method_without_radio_is_named_as_such(tmp_path):
     ignored = Decision.UNUSABLE, Reason.KIND_NOT_CONSUMED
     moment = moment_of(tmp_path, lambda s: [(anchor, *ignored, None) for anchor in "abc"])
     assert moment.causes == ("uses no radio",)
@@ -186,7 +186,7 @@ def test_late_readings_are_counted(tmp_path, late):
     assert any("late (too late)" in cause for cause in moment.causes) == bool(late)
 
 
-def test_anchor_that_misled_most_is_named_by_what_it_said_of_the_true_place(tmp_path):
+def test_anchor_that_misled_most_is_named_by_its_readings_at_the_true_place(tmp_path):
     moment = moment_of(tmp_path, all_taken, off_m=lambda _, anchor: {"a": -0.3, "c": 3.0}.get(anchor, 0.0))
     std = np.hypot(np.hypot(0.15, 0.15), 0.05 * RANGE_M["c"])
     assert moment.causes == (f"believed c, 3.00 m farther than it was ({3.0 / std:.1f}σ)",)
@@ -208,7 +208,7 @@ def test_growth_of_the_error_is_shared_out_among_scans_and_the_time_between_them
     assert silent.growth == Growth(1.0, 0.0, 5.0)
 
 
-def test_only_what_was_taken_is_said_to_have_misled(tmp_path):
+def test_only_what_was_taken_counts_as_misleading(tmp_path):
     def judge(second):
         return [("a", *(GATED if second % 2 else TAKEN), 1.0), *all_taken(second)[1:]]
 
@@ -229,6 +229,6 @@ def test_kind_that_is_not_listened_to_misleads_nobody(tmp_path):
     assert not any("believe" in cause for cause in moment.causes)
 
 
-def test_run_without_odometry_is_told_from_one_that_has_not_begun(tmp_path):
+def test_run_without_odometry_is_distinguished_from_one_that_has_not_begun(tmp_path):
     assert moment_of(tmp_path, all_taken, odometry=lambda _: False).causes == ("no odometry in this run",)
     assert moment_of(tmp_path, all_taken, odometry=lambda s: s > 35).causes == ("no odometry yet",)

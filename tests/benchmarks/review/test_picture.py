@@ -1,4 +1,4 @@
-"""Pictures by the real viewer, and what is said where there is none."""
+"""Pictures by the real viewer, and what is reported where there is none."""
 
 import struct
 import sys
@@ -82,13 +82,13 @@ def test_web_viewer_answers_on_this_machine_and_ends_with_the_block(log, tmp_pat
     assert served.process.poll() is not None
 
 
-def test_without_rerun_the_remedy_is_told(log, tmp_path, monkeypatch):
+def test_without_rerun_the_remedy_is_reported(log, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(ViewerError, match=r"pip install 'fusion-localization\[review\]'"):
         review(log, save=tmp_path / "review.rrd")
 
 
-def test_without_a_display_it_says_what_to_do_instead(log, monkeypatch):
+def test_without_a_display_it_proposes_what_to_do_instead(log, monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
@@ -97,7 +97,7 @@ def test_without_a_display_it_says_what_to_do_instead(log, monkeypatch):
         review(log)
 
 
-def test_viewer_that_ends_at_once_is_told_with_the_remedy(tmp_path, monkeypatch):
+def test_viewer_that_ends_at_once_is_reported_with_the_remedy(tmp_path, monkeypatch):
     pytest.importorskip("rerun", reason="needs the extra `review`")
     scene = tmp_path / "review.rrd"
     scene.write_bytes(b"")
@@ -120,7 +120,7 @@ def test_viewer_that_ends_at_once_is_told_with_the_remedy(tmp_path, monkeypatch)
         open_viewer([scene])
 
 
-def test_picture_that_cannot_be_written_is_told(tmp_path):
+def test_picture_that_cannot_be_written_is_reported(tmp_path):
     pytest.importorskip("rerun", reason="needs the extra `review`")
     (tmp_path / "scene.rrd").write_bytes(b"")
     (tmp_path / "file").write_bytes(b"")

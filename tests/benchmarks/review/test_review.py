@@ -13,14 +13,14 @@ from fusion.cli.main import main
 from logs.reader import read_run
 
 
-def told(capsys, *words):
+def run_review(capsys, *words):
     code = main(["review", *map(str, words)])
     return code, *capsys.readouterr()
 
 
 def test_worst_moments_are_listed_with_a_command_that_opens_them_and_need_no_rerun(log, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
-    code, out, _ = told(capsys, log, "--estimators", "ekf,dead_reckoning", "--worst", "2")
+    code, out, _ = run_review(capsys, log, "--estimators", "ekf,dead_reckoning", "--worst", "2")
     lines = out.splitlines()
     assert code == 0
     assert len(lines) == 8
@@ -37,15 +37,15 @@ def test_worst_moment_is_the_largest_error_of_the_scores(log):
 
 def test_parameters_are_given_reach_the_estimator_and_stand_in_the_command(log, capsys):
     word = "ekf.gate_probability=0.5"
-    _, plain, _ = told(capsys, log, "--estimators", "ekf", "--worst", "1")
-    code, out, _ = told(capsys, log, "--estimators", "ekf", "--worst", "1", "--set", word)
+    _, plain, _ = run_review(capsys, log, "--estimators", "ekf", "--worst", "1")
+    code, out, _ = run_review(capsys, log, "--estimators", "ekf", "--worst", "1", "--set", word)
     assert code == 0
     assert out.splitlines()[0] != plain.splitlines()[0]
     assert out.endswith(f" --set {word}\n")
 
 
 def test_counterfactuals_show_what_the_error_of_a_worst_moment_would_have_been(log, capsys):
-    _, out, _ = told(capsys, log, "--estimators", "ekf", "--worst", "1", "--without", "ap1")
+    _, out, _ = run_review(capsys, log, "--estimators", "ekf", "--worst", "1", "--without", "ap1")
     (moment,) = review(log, estimators=["ekf"], worst=1, without=["ap1"]).moments
     assert moment.otherwise["ekf without ap1"] != moment.error_m
     assert out.splitlines()[0].endswith(f"; ekf without ap1: {moment.otherwise['ekf without ap1']:.2f} m")
@@ -56,7 +56,7 @@ def test_counterfactuals_show_what_the_error_of_a_worst_moment_would_have_been(l
     [("ekf.gate=1", "gate_probability"), ("efk.gate_probability=0.9", "did you mean 'ekf'"), ("gate=1", "expected")],
 )
 def test_parameters_that_are_none_are_refused(log, capsys, word, told_of):
-    code, _, err = told(capsys, log, "--estimators", "ekf", "--worst", "1", "--set", word)
+    code, _, err = run_review(capsys, log, "--estimators", "ekf", "--worst", "1", "--set", word)
     assert code == 1
     assert told_of in err
 
@@ -64,7 +64,9 @@ def test_parameters_that_are_none_are_refused(log, capsys, word, told_of):
 def test_layers_and_counterfactuals_are_written_and_named(log, tmp_path, capsys):
     pytest.importorskip("rerun", reason="needs the extra `review`")
     folder = tmp_path / "layers"
-    code, out, _ = told(capsys, log, "--estimators", "ekf", "--save", folder, "--without", "ap1", "--reject", "10")
+    code, out, _ = run_review(
+        capsys, log, "--estimators", "ekf", "--save", folder, "--without", "ap1", "--reject", "10"
+    )
     assert code == 0
     names = ["base.rrd", "ekf.rrd", "ekf without ap1.rrd", "ekf reject 9.98 s.rrd"]
     assert out.splitlines() == [str(folder / name) for name in names]
@@ -73,13 +75,13 @@ def test_layers_and_counterfactuals_are_written_and_named(log, tmp_path, capsys)
 
 def test_misspelt_anchor_is_refused_before_anything_is_written(log, tmp_path, capsys):
     pytest.importorskip("rerun", reason="needs the extra `review`")
-    code, _, err = told(capsys, log, "--save", tmp_path / "r.rrd", "--without", "ap11")
+    code, _, err = run_review(capsys, log, "--save", tmp_path / "r.rrd", "--without", "ap11")
     assert (code, list(tmp_path.iterdir())) == (1, [])
     assert "did you mean 'ap1'?" in err
 
 
-def test_web_refuses_a_folder_of_layers_and_says_what_it_takes(log, tmp_path, capsys):
-    code, _, err = told(capsys, log, "--web", "--save", tmp_path / "layers")
+def test_web_refuses_a_folder_of_layers_and_states_what_it_takes(log, tmp_path, capsys):
+    code, _, err = run_review(capsys, log, "--web", "--save", tmp_path / "layers")
     assert code == 1
     assert f"give --save {tmp_path / 'layers'}.rrd" in err
 
@@ -108,7 +110,7 @@ def test_made_up_run_of_the_cost_measurement_is_written(tmp_path):
 
 def test_time_that_is_none_of_the_run_is_refused_before_any_work(log, tmp_path, capsys):
     pytest.importorskip("rerun", reason="needs the extra `review`")
-    code, _, err = told(capsys, log, "--estimators", "ekf", "--save", tmp_path / "r.rrd", "--at", "31")
+    code, _, err = run_review(capsys, log, "--estimators", "ekf", "--save", tmp_path / "r.rrd", "--at", "31")
     assert (code, list(tmp_path.iterdir())) == (1, [])
     assert "--at 31: " in err
     assert "give a time in between" in err

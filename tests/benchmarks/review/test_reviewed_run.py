@@ -45,16 +45,16 @@ def place(tmp_path_factory):
     run = simulated_run(load_scenario("paper_mec"), 1)
     (folder / "world.toml").write_text(tomlkit.dumps(json.loads(run.world.table)), encoding="utf-8")
     (folder / "suite.toml").write_text(SUITE, encoding="utf-8")
-    said = [(EPOCH_NS + m.time_ns, m) for m in run.measurements if m.time_ns < 40_000_000_000]
+    stamped = [(EPOCH_NS + m.time_ns, m) for m in run.measurements if m.time_ns < 40_000_000_000]
     turn = math.tau / run.world.robot.ticks_per_revolution
     rows = [
         ("/joints", t, ros.joints(t, **{name: turn * ticks for name, ticks in zip(WHEELS, m.counts, strict=True)}))
-        for t, m in said
+        for t, m in stamped
         if isinstance(m, WheelTicks)
     ]
     rows += [
         ("/scans", t, ros.scan(t, **{r.anchor: r.rssi_dbm for r in m.readings}))
-        for t, m in said
+        for t, m in stamped
         if isinstance(m, WifiScan)
     ]
     truth = run.truth
@@ -66,7 +66,7 @@ def place(tmp_path_factory):
 
 
 @pytest.fixture
-def told(place, capsys, monkeypatch):
+def call(place, capsys, monkeypatch):
     """Runs a verb beside the bag; answers code, output, errors."""
     monkeypatch.chdir(place)
 
@@ -81,18 +81,18 @@ LOOK = ("--estimators", "ekf,dead_reckoning", "--worst", "1")
 TRUTH = ("--topic", "truth=/mocap")
 
 
-def test_bag_is_seen_as_the_log_that_is_imported_from_it(told):
-    code, seen, err = told("review", "walk", "--world", "world.toml", *TRUTH, *LOOK)
+def test_bag_is_seen_as_the_log_that_is_imported_from_it(call):
+    code, seen, err = call("review", "walk", "--world", "world.toml", *TRUTH, *LOOK)
     assert (code, err) == (0, "")
     assert len(seen.splitlines()) == 4
-    assert told("import", "rosbag", "walk", "--world", "world.toml", *TRUTH, "-o", "walk.mcap")[0] == 0
-    _, imported, _ = told("review", "walk.mcap", *LOOK)
+    assert call("import", "rosbag", "walk", "--world", "world.toml", *TRUTH, "-o", "walk.mcap")[0] == 0
+    _, imported, _ = call("review", "walk.mcap", *LOOK)
     assert seen.splitlines()[::2] == imported.splitlines()[::2]
 
 
-def test_bag_is_drawn(told, place):
+def test_bag_is_drawn(call, place):
     pytest.importorskip("rerun", reason="needs the extra `review`")
-    assert told("review", "walk", "--world", "world.toml", *TRUTH, "--estimators", "ekf", "--save", "walk.rrd")[0] == 0
+    assert call("review", "walk", "--world", "world.toml", *TRUTH, "--estimators", "ekf", "--save", "walk.rrd")[0] == 0
     assert (place / "walk.rrd").stat().st_size > 10_000
 
 
@@ -104,20 +104,20 @@ def test_bag_is_drawn(told, place):
         ("mec", "--suite", "suite.toml"),
     ],
 )
-def test_command_of_a_worst_moment_opens_the_same_run(told, subject):
-    _, seen, _ = told("review", *subject, *LOOK)
+def test_command_of_a_worst_moment_opens_the_same_run(call, subject):
+    _, seen, _ = call("review", *subject, *LOOK)
     assert len(seen.splitlines()) == 4
     for moment, command in zip(seen.splitlines()[::2], seen.splitlines()[1::2], strict=True):
         _, verb, *words = shlex.split(command)
-        code, again, _ = told(verb, *words, "--worst", "1")
+        code, again, _ = call(verb, *words, "--worst", "1")
         assert code == 0
         assert moment in again.splitlines()
 
 
-def test_run_of_a_suite_is_the_one_its_bench_scores(told):
-    _, of_suite, _ = told("review", "walk", "--suite", "suite.toml", *LOOK)
+def test_run_of_a_suite_is_the_one_its_bench_scores(call):
+    _, of_suite, _ = call("review", "walk", "--suite", "suite.toml", *LOOK)
     assert len(of_suite.splitlines()) == 4
-    _, of_bag, _ = told("review", "walk", "--world", "world.toml", *TRUTH, *LOOK)
+    _, of_bag, _ = call("review", "walk", "--world", "world.toml", *TRUTH, *LOOK)
     assert of_suite.splitlines()[::2] == of_bag.splitlines()[::2]
 
 
@@ -153,22 +153,22 @@ def test_folder_of_a_bag_is_read_anew_once_its_files_change(place, tmp_path):
         (["walk", "--world", "world.toml", *LOOK, *TRUTH, "--set", "ekf.gates=1"], "ekf has no parameter 'gates'"),
     ],
 )
-def test_what_cannot_be_opened_says_what_it_needs(told, words, message):
-    code, out, err = told("review", *words, "--save", "never.rrd")
+def test_what_cannot_be_opened_is_refused_with_what_it_needs(call, words, message):
+    code, out, err = call("review", *words, "--save", "never.rrd")
     assert (code, out) == (1, "")
     assert message in err
 
 
-def test_what_a_bag_lacks_is_told_beside_the_review(told):
+def test_what_a_bag_lacks_is_reported_beside_the_review(call):
     pytest.importorskip("rerun", reason="needs the extra `review`")
     words = ("--topic", "wifi=none", "--estimators", "dead_reckoning", "--save", "blind.rrd")
-    code, _, err = told("review", "walk", "--world", "world.toml", *words)
+    code, _, err = call("review", "walk", "--world", "world.toml", *words)
     assert code == 0
     assert "no truth is named, so errors cannot be scored; it may be in /mocap" in err
     assert "holds no ground truth, so nothing shows how far anyone erred" in err
     assert "holds no signal strengths and no ranges, so nothing corrects the odometry" in err
 
 
-def test_own_log_with_everything_has_no_remarks(told, place):
+def test_own_log_with_everything_has_no_remarks(call, place):
     simulate("paper_mec", place / "own.mcap", seed=1, duration_s=20.0)
-    assert told("review", "own.mcap", *LOOK)[2] == ""
+    assert call("review", "own.mcap", *LOOK)[2] == ""

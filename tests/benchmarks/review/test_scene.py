@@ -236,7 +236,7 @@ def test_circles_are_those_of_the_last_scan_in_the_colour_of_their_weight(tmp_pa
     assert colours[0][0] != colours[1][0]
 
 
-def test_circles_are_of_every_anchor_heard_within_a_second_and_then_vanish():
+def test_circles_are_of_every_anchor_received_within_a_second_and_then_vanish():
     # a, b, a again; c is of no use, and hides the circle that c had.
     time_ns = np.array([0, 400, 600, 700, 900, 1100]) * 1_000_000
     anchor, drawn = np.array([2, 0, 2, 1, 1, 0], dtype=np.int16), np.array([1, 1, 1, 1, 0, 1], dtype=bool)
@@ -370,7 +370,7 @@ def test_estimator_without_answers_and_crashed_one_have_a_legend_and_no_track(tm
     assert {"/scores", "/map/legend/silent", "/map/legend/broken"} <= chunks.keys()
 
 
-def test_score_table_ranks_the_live_first_and_tells_the_crash(tmp_path):
+def test_score_table_ranks_the_live_first_and_reports_the_crash(tmp_path):
     run = run_of(tmp_path)
     lines = markdown(drawings(run, scored(run, ["broken", "toy"]))).splitlines()
     assert lines[0].endswith("| avail. | time | age | gaps |")
@@ -393,14 +393,14 @@ def test_full_disk_is_one_error(tmp_path):
         write_scene(tmp_path / "layers", run, reviewed)
 
 
-def test_answer_that_is_no_number_is_told_beside_the_table_and_draws_no_error(tmp_path):
+def test_answer_that_is_no_number_is_reported_beside_the_table_and_draws_no_error(tmp_path):
     with fusion.registered("poisoned", Poisoned):
         run = run_of(tmp_path)
         reviewed = scored(run, ["poisoned", "toy"])
     table = markdown(drawings(run, reviewed)).splitlines()
-    row, told = table[3], table[-1]
+    row, note = table[3], table[-1]
     assert row.startswith("| poisoned (diverged) | – | – | ∞ |")
-    assert told.startswith("poisoned diverged: it answers x nan m, y 0.5 m, heading 0 rad, 2 s after its first answer")
+    assert note.startswith("poisoned diverged: it answers x nan m, y 0.5 m, heading 0 rad, 2 s after its first answer")
     (scene,) = write_scene(tmp_path / "review.rrd", run_of(tmp_path), reviewed)
     assert "/error/poisoned" not in chunks_of(scene)
     assert "/map/estimate/poisoned/path" in chunks_of(scene)

@@ -222,7 +222,7 @@ def test_records_are_strict_json_with_flat_metrics(tmp_path):
     assert quiet["status"] == "diverged"
 
 
-def test_log_without_truth_says_so_and_reports_the_rest(tmp_path, capsys):
+def test_log_without_truth_is_named_and_the_rest_reported(tmp_path, capsys):
     scores = bench([write_run(tmp_path / "run.mcap", truth=False)], estimators=["toy_wheels"], workers=1)
     assert scores[0].status == "unscored"
     assert detailed(scores[0])["digest"]
@@ -298,7 +298,7 @@ def test_table_over_several_runs_has_medians_and_the_worst(tmp_path, capsys):
     assert row[:4] == ["toy_drifts", "3/3", f"{100 * rmse[1]:.1f}", f"{100 * rmse[2]:.1f}"]
 
 
-def test_logs_of_one_name_are_told_apart_by_their_place(tmp_path):
+def test_logs_of_one_name_are_distinguished_by_their_place(tmp_path):
     runs = [write_run(tmp_path / name / "run.mcap") for name in "ab"]
     assert [score.run for score in bench(runs, estimators=["toy_wheels"], workers=1)] == list(map(str, runs))
 
@@ -332,10 +332,10 @@ def test_estimator_that_is_not_installed_is_left_out_and_refused_by_name(strange
     with pytest.raises(NotInstalledError, match=re.escape(f"lacking_two: {stranger}")):
         bench([path], estimators=["dead_reckoning", "lacking_two"], workers=1)
     assert main(["bench", str(path), "--workers", "1", "--json", "-"]) == 0
-    told = capsys.readouterr()
-    assert told.err.startswith(f"fusion bench: lacking_one, lacking_two: {stranger}\n")
-    assert told.err.count("no_such_package") == 1
-    assert {row["estimator"] for row in json.loads(told.out)} == {*fusion.names()} - {"lacking_one", "lacking_two"}
+    printed = capsys.readouterr()
+    assert printed.err.startswith(f"fusion bench: lacking_one, lacking_two: {stranger}\n")
+    assert printed.err.count("no_such_package") == 1
+    assert {row["estimator"] for row in json.loads(printed.out)} == {*fusion.names()} - {"lacking_one", "lacking_two"}
 
 
 def test_same_cell_twice_gives_the_same_digest(tmp_path):

@@ -68,10 +68,10 @@ def optional(stranger, tmp_path):
 
 def test_optional_estimator_that_is_not_installed_is_left_out_with_the_remedy(optional, stranger, tmp_path, capsys):
     assert main(["bench", "run", *optional, "-j", "1"]) == 0
-    told = capsys.readouterr()
-    assert told.err == f"fusion bench: lacking_one: {stranger}\nfusion bench run: 1 ok\n"
-    assert "wheels" in told.out
-    assert "theirs" not in told.out
+    printed = capsys.readouterr()
+    assert printed.err == f"fusion bench: lacking_one: {stranger}\nfusion bench run: 1 ok\n"
+    assert "wheels" in printed.out
+    assert "theirs" not in printed.out
     page = tmp_path / "page.md"
     assert main(["bench", "report", *optional, "--markdown", str(page)]) == 0
     assert f"Left out: lacking_one: {stranger}." in page.read_text(encoding="utf-8")
@@ -118,7 +118,7 @@ def test_suites_have_enough_runs_for_a_verdict():
 
 
 @pytest.mark.parametrize("name", sorted(CATALOGUE))
-def test_catalogue_tells_where_a_set_comes_from_and_on_what_terms(name):
+def test_catalogue_lists_where_a_set_comes_from_and_on_what_terms(name):
     entry = CATALOGUE[name]
     assert entry["importer"] in names(IMPORTERS)
     assert entry["address"].startswith("https://")

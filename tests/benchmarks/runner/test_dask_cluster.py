@@ -167,15 +167,15 @@ def test_cell_that_hangs_dies_or_eats_memory_costs_itself_only(lone_worker, tmp_
 def test_interrupted_run_leaves_no_process_and_a_store_that_is_gone_on_with(lone_worker, tmp_path):
     text, store, address = SUITE + TROUBLE, Store(tmp_path / "store"), lone_worker.scheduler_address
     patient = write_suite(tmp_path, with_limits(text, "limits = { wall_s = 3600.0, rss_mb = 400.0 }"))
-    told = []
+    reported = []
 
     def interrupt(done, total, what):
-        told.append((done, total))
+        reported.append((done, total))
         raise KeyboardInterrupt
 
     with suppress(KeyboardInterrupt):
         run_suite(patient, store, dask=address, progress=interrupt)
-    assert told == [(1, 6)]
+    assert reported == [(1, 6)]
     assert worker_of(lone_worker).children() == []
     assert "hangs" not in statuses(read_results(cells_of(patient, store), store))
     resumed = run_suite(write_suite(tmp_path, with_limits(text)), store, dask=address)
@@ -183,7 +183,7 @@ def test_interrupted_run_leaves_no_process_and_a_store_that_is_gone_on_with(lone
 
 
 def test_cell_whose_dask_worker_died_is_not_done_rather_than_crashed(lone_worker, tmp_path):
-    """What the cluster loses says nothing about the estimator; and a cell does not outlive its Dask worker."""
+    """What the cluster loses is no failure of the estimator; and a cell does not outlive its Dask worker."""
     store, pid_file = Store(tmp_path / "store"), tmp_path / "pid"
     use = f'use = "kills_its_parent"\nparams = {{ pid_file = "{pid_file}" }}\n'
     suite = write_suite(tmp_path, f'{with_limits(SUITE, "")}\n[[estimators]]\nid = "killer"\n{use}')
@@ -196,7 +196,7 @@ def test_cell_whose_dask_worker_died_is_not_done_rather_than_crashed(lone_worker
     assert statuses(run_suite(healthy, store, dask=lone_worker.scheduler_address)) == {"wheels": "ok", "pf": "ok"}
 
 
-def test_scheduler_that_does_not_answer_is_told(tmp_path, monkeypatch):
+def test_scheduler_that_does_not_answer_is_reported(tmp_path, monkeypatch):
     monkeypatch.setattr("benchmarks.runner.dask_cluster.PATIENCE_S", 1.0)
     with pytest.raises(FusionError, match="no scheduler answers"):
         run_suite(write_suite(tmp_path, SUITE), Store(tmp_path / "store"), dask="tcp://127.0.0.1:9")

@@ -64,10 +64,10 @@ def test_verify_comes_to_its_end(suite, capsys):
 
 def test_time_names_who_has_none_and_why(suite, capsys):
     assert main(["bench", "time", *suite, "--repeats", "1"]) == 0
-    said = capsys.readouterr()
-    assert "dead_reckoning" in said.out
+    printed = capsys.readouterr()
+    assert "dead_reckoning" in printed.out
     for name, why in zip(NAMES, ("longer than limits.wall_s", "died", "died", "no luck"), strict=True):
-        (line,) = [line for line in said.err.splitlines() if f" {name} has no time" in line]
+        (line,) = [line for line in printed.err.splitlines() if f" {name} has no time" in line]
         assert why in line
     with open(f"{suite[-1]}/timing.json", encoding="utf-8") as stream:
         assert [row["estimator"] for row in json.load(stream)["untimed"]] == list(NAMES)

@@ -88,7 +88,7 @@ def test_cell_that_fell_silent_keeps_its_availability_and_no_mean_of_its_answers
     assert silent.metrics["pos_p75"] == math.inf
 
 
-def test_leaderboards_show_a_dash_and_the_run_tells_why(data):
+def test_leaderboards_show_a_dash_and_the_run_states_why(data):
     for table in (stored.suite_leaderboard(data.results), leaderboard(data)):
         (row,) = [row for row in table.rows if row[0].startswith("poisoned")]
         shown = dict(zip(table.head, row, strict=True))
@@ -96,12 +96,12 @@ def test_leaderboards_show_a_dash_and_the_run_tells_why(data):
             text for title, text in shown.items() if title.startswith(("RMSE", "mean", "max", "heading", "ANEES"))
         ] == ["–"] * 5
         assert table.rows[-1][0].startswith("poisoned")
-    told = run_verb.lost(data.results)
-    assert any(line.startswith(f"poisoned lost 2 of its cells: {CAUSE}") for line in told)
-    assert any(line.startswith("radio lost 1 of its cells: only ") for line in told)
+    sentences = run_verb.lost(data.results)
+    assert any(line.startswith(f"poisoned lost 2 of its cells: {CAUSE}") for line in sentences)
+    assert any(line.startswith("radio lost 1 of its cells: only ") for line in sentences)
 
 
-def test_report_says_why_and_compares_no_lost_cell_with_physics(data):
+def test_report_states_why_and_compares_no_lost_cell_with_physics(data):
     reasons = {row[0].partition("]")[0]: row[2] for row in lost(data).rows}
     assert reasons["[office poisoned clean 0"].startswith(f"`{CAUSE}")
     for table in (limits(data), fixes(data)):

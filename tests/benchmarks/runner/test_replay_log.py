@@ -1,4 +1,4 @@
-"""A cell is made again as a log: what was measured is in it to the bit, faults and all, and so is what was said."""
+"""A cell is made again as a log: what was measured is in it to the bit, faults and all, and so are the estimates."""
 
 import pytest
 

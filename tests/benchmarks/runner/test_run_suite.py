@@ -118,7 +118,7 @@ def test_another_evaluation_scores_old_tracks_again_without_an_estimator(suite, 
 
 
 @pytest.mark.parametrize("reading", ["causal", "interp"])
-def test_scoring_anew_opens_no_run_and_says_the_same(tmp_path, monkeypatch, reading):
+def test_scoring_anew_opens_no_run_and_gives_the_same(tmp_path, monkeypatch, reading):
     text = SUITE.replace("paper_", "").replace("seeds = 2", f'eval = {{ reading = "{reading}" }}')
     late = fault('kind = "kidnap", from_s = 5.0, until_s = 9.0')
     store = Store(tmp_path / "store")
@@ -219,7 +219,7 @@ def test_dropped_window_is_scored_by_itself(tmp_path):
     assert not any(name.startswith("fault_") for name in results["clean"].metrics)
 
 
-def test_log_is_told_by_its_content_not_by_its_name(tmp_path):
+def test_log_is_identified_by_its_content_not_by_its_name(tmp_path):
     simulate("paper_office", tmp_path / "a.mcap", seed=1, duration_s=10.0)
     (tmp_path / "b.mcap").write_bytes((tmp_path / "a.mcap").read_bytes())
     text = SUITE.replace('scenario = "paper_office"\nduration_s = 20.0', 'mcap = "a.mcap"')
@@ -311,7 +311,7 @@ def test_parameters_that_a_plug_in_refuses_in_its_own_way_are_refused(
         refuse_impossible(cells)
 
 
-def test_log_says_its_world_and_its_anchors_before_it_is_run(tmp_path, capsys):
+def test_log_gives_its_world_and_its_anchors_before_it_is_run(tmp_path, capsys):
     simulate("paper_office", tmp_path / "a.mcap", seed=1, duration_s=10.0)
     assert read_world(tmp_path / "a.mcap") == read_run(tmp_path / "a.mcap").world
     text = SUITE.replace('scenario = "paper_office"\nduration_s = 20.0', 'mcap = "a.mcap"')
@@ -343,14 +343,14 @@ def test_runner_that_was_killed_leaves_a_store_that_is_gone_on_with(suite, tmp_p
     assert digests(results) == digests(run_suite(suite, Store(tmp_path / "fresh"), workers=1))
 
 
-def test_plan_and_run_tell_what_they_did(suite, tmp_path, capsys):
+def test_plan_and_run_report_what_they_did(suite, tmp_path, capsys):
     words = [str(tmp_path / "suite.toml"), "--store", str(tmp_path / "store")]
     assert main(["bench", "plan", *words]) == 0
     assert "2 runs x 2 estimators x 1 faults x 2 seeds = 8 cells" in capsys.readouterr().out
     assert main(["bench", "run", *words, "-j", "1"]) == 0
-    told = capsys.readouterr()
-    assert "8 ok" in told.err
-    assert "clean: medians over cells" in told.out
+    printed = capsys.readouterr()
+    assert "8 ok" in printed.err
+    assert "clean: medians over cells" in printed.out
     assert main(["bench", "plan", *words, "--json"]) == 0
     counts = json.loads(capsys.readouterr().out)
     assert (counts["cells"], counts["cached"], counts["missing_estimates"]) == (8, 8, 0)
@@ -379,16 +379,16 @@ def test_stored_metrics_are_the_numbers_of_the_score(suite, tmp_path):
     assert all(result.metrics["availability"] == 1.0 for result in results)
 
 
-def test_run_tells_why_cells_were_lost(tmp_path, capsys):
+def test_run_reports_why_cells_were_lost(tmp_path, capsys):
     greedy = '[[estimators]]\nid = "none"\nuse = "particle"\nparams = { particles = 1_000_000_000_000_000 }\n'
     write_suite(tmp_path, SUITE + greedy)
     assert main(["bench", "run", str(tmp_path / "suite.toml"), "--store", str(tmp_path / "store"), "-j", "1"]) == 0
-    told = capsys.readouterr().err
-    assert "4 crashed, 8 ok" in told
-    assert "none lost 4 of its cells: Particle failed at its start: MemoryError" in told
+    printed = capsys.readouterr().err
+    assert "4 crashed, 8 ok" in printed
+    assert "none lost 4 of its cells: Particle failed at its start: MemoryError" in printed
 
 
-def test_damaged_track_is_told_not_traced(suite, tmp_path):
+def test_damaged_track_is_reported_not_traced(suite, tmp_path):
     store, cell = Store(tmp_path / "store"), cells_of(suite, Store(tmp_path / "store"))[0]
     carry_out((cell, store.folder))
     assert len(stored_track(cell, store)[0].time_ns) > 0
@@ -400,7 +400,7 @@ def test_damaged_track_is_told_not_traced(suite, tmp_path):
             stored_track(cell, store)
 
 
-def test_damaged_truth_is_told_not_traced(suite, tmp_path):
+def test_damaged_truth_is_reported_not_traced(suite, tmp_path):
     store, cell = Store(tmp_path / "store"), cells_of(suite, Store(tmp_path / "store"))[0]
     carry_out((cell, store.folder))
     (path,) = store.folder.glob("references/*/*/truth.npz")

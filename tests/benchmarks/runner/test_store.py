@@ -8,7 +8,7 @@ from fusion import FusionError
 KEY = key_of({"a": 1})
 
 
-def test_what_was_written_is_read_and_what_was_not_is_told(tmp_path):
+def test_what_was_written_is_read_and_what_was_not_is_reported(tmp_path):
     store = Store(tmp_path / "store")
     assert not store.has("scores", KEY)
     store.write("scores", KEY, {"result.json": to_json({"b": [1.5, None]})})
@@ -36,19 +36,19 @@ def test_half_an_entry_that_a_killed_runner_left_is_no_entry(tmp_path):
     assert store.has("scores", KEY)
 
 
-def test_damaged_entry_is_told_with_the_folder_to_delete(tmp_path):
+def test_damaged_entry_is_reported_with_the_folder_to_delete(tmp_path):
     store = Store(tmp_path)
     store.write("scores", KEY, {"result.json": b"{"})
     with pytest.raises(FusionError, match=f"is damaged .*; delete {store.place('scores', KEY)} and run again"):
         store.read_json("scores", KEY, "result.json")
 
 
-def test_place_that_cannot_be_written_is_told(tmp_path):
+def test_place_that_cannot_be_written_is_reported(tmp_path):
     (tmp_path / "scores").write_text("a file where a folder should be")
     with pytest.raises(FusionError, match=r"cannot be written .* --store"):
         Store(tmp_path).write("scores", KEY, {"x": b""})
 
 
 @pytest.mark.parametrize("other", [{"a": 2}, {"a": 1.0}, {"a": "1"}, {"b": 1}, {"a": 1, "b": None}])
-def test_keys_tell_apart_what_differs(other):
+def test_keys_distinguish_what_differs(other):
     assert key_of(other) != KEY

@@ -86,10 +86,10 @@ def test_matrix_has_one_row_a_run_and_infinity_where_a_run_was_lost(results):
 
 def test_compare_states_in_a_sentence_who_is_better_or_that_it_is_inconclusive(place, results, capsys):
     assert main(words(place, "compare")) == 0
-    said = capsys.readouterr().out
+    printed = capsys.readouterr().out
     (verdict,) = comparison(results).verdicts
-    assert said.startswith(verdict.sentence)
-    assert "ratio [95 %]" in said
+    assert printed.startswith(verdict.sentence)
+    assert "ratio [95 %]" in printed
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_a_cell_that_is_lost_now_and_was_not_before_is_a_regression(results):
     assert judge(lost, Gate(), baseline_of(lost)) == []
 
 
-def test_estimator_that_the_baseline_does_not_know_cannot_be_told(results):
+def test_estimator_that_the_baseline_does_not_know_is_inconclusive(results):
     known = {"wheels": baseline_of(results)["wheels"]}
     assert Outcome.INCONCLUSIVE in outcomes(judge(results, Gate(ratio={"pos_p75": 0.05}), known))
 
@@ -182,7 +182,7 @@ def test_scores_of_zero_have_no_ratio(results):
 
 
 @pytest.mark.parametrize("silent", [0, -1])
-def test_cell_that_says_nothing_hides_behind_no_other(results, silent):
+def test_cell_without_a_value_hides_behind_no_other(results, silent):
     spoilt = list(results)
     spoilt[silent] = results[silent]._replace(metrics={**results[silent].metrics, "availability": math.nan})
     assert Outcome.INCONCLUSIVE in outcomes(judge(spoilt, Gate(floor={"availability": 0.9}), None))
@@ -203,7 +203,7 @@ def test_gate_limits_the_growth_of_nothing_that_should_grow(place, tmp_path, cap
 
 
 @pytest.mark.parametrize("spoil", [{"pos_p75": "high"}, {"pos_p75": math.nan}, {"pos_p75": True}, "twice"])
-def test_rows_of_a_baseline_that_make_no_sense_are_told(place, results, spoil, tmp_path, capsys):
+def test_rows_of_a_baseline_that_make_no_sense_are_reported(place, results, spoil, tmp_path, capsys):
     rows = [flat(result) for result in results]
     rows = [*rows, rows[0]] if spoil == "twice" else [{**rows[0], **spoil}, *rows[1:]]
     path = tmp_path / "base.json"
@@ -247,12 +247,12 @@ def test_gate_for_a_metric_that_no_cell_has_never_passes(place, results, tmp_pat
         pytest.param(json.dumps({"metrics_version": METRICS_VERSION, "results": 3}).encode(), id="no rows"),
     ],
 )
-def test_file_that_is_no_baseline_is_told_in_a_line(place, tmp_path, content, capsys):
+def test_file_that_is_no_baseline_is_reported_in_a_line(place, tmp_path, content, capsys):
     (tmp_path / "base").write_bytes(content)
     assert main(words(place, "gate", "--baseline", str(tmp_path / "base"))) == Outcome.USAGE
-    said = capsys.readouterr().out
-    assert "no baseline (" in said
-    assert len(said) < 300
+    printed = capsys.readouterr().out
+    assert "no baseline (" in printed
+    assert len(printed) < 300
 
 
 @pytest.mark.parametrize("more", [["gate", "--verify", "-3"], ["verify", "--sample", "0"]])
@@ -325,7 +325,7 @@ def test_peak_memory_is_that_of_the_estimator_in_a_process_of_its_own(tmp_path):
     assert many > few + 3 * 2.4e6 / 2**20
 
 
-def test_what_an_estimator_says_breaks_no_export():
+def test_error_of_an_estimator_breaks_no_export():
     cell = SimpleNamespace(run=RunSource("a"), fault=FaultSet("clean"), estimator=EstimatorSpec("b", "b"), seed=0)
     lost = SimpleNamespace(cell=cell, status="crashed", error="red \x1b[31m & <b>\x00")
     failure = ElementTree.fromstring(as_junit(SimpleNamespace(name="s"), [lost])).find("testcase/failure")

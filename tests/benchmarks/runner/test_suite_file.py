@@ -1,4 +1,4 @@
-"""A suite file is checked whole before any work, and says where it is wrong."""
+"""A suite file is checked whole before any work, and refused with the place of the error."""
 
 import pytest
 
@@ -71,7 +71,7 @@ def test_grid_is_spread_into_estimators_with_their_own_ids(tmp_path):
         ("x = [", "not TOML"),
     ],
 )
-def test_wrong_suite_is_refused_and_says_where(tmp_path, more, message):
+def test_wrong_suite_is_refused_with_the_place(tmp_path, more, message):
     with pytest.raises(SuiteError, match=message) as refusal:
         load_suite(written(tmp_path, SUITE + more))
     assert "suite.toml" in str(refusal.value)
@@ -101,6 +101,6 @@ def test_parameters_tuned_on_a_tune_run_may_be_judged_on_another(tmp_path):
     assert load_suite(written(tmp_path, SUITE + more)).estimators[1].tuned_on == ("b",)
 
 
-def test_missing_suite_is_told(tmp_path):
+def test_missing_suite_is_reported(tmp_path):
     with pytest.raises(SuiteError, match="cannot be read"):
         load_suite(tmp_path / "none.toml")

@@ -49,7 +49,7 @@ def take_memory(megabytes):
 
 
 def die_once_and_hang(marker, fifo):
-    """Goes on the second time when somebody reads what it tells, and then no more."""
+    """Goes on the second time when somebody reads its output, and then no more."""
     fifo.write_text(die_once(marker), encoding="ascii")
     time.sleep(3600.0)
 
@@ -147,7 +147,7 @@ def test_task_of_a_pool_that_is_dismissed_is_not_lost_but_cancelled(tmp_path):
             list(pool.compute(POWERS, 1))
 
 
-def test_words_hash_alike_whatever_the_environment_says(monkeypatch):
+def test_words_hash_alike_whatever_the_environment_sets(monkeypatch):
     command = [sys.executable, "-c", "print(hash('anchor'))"]
     unsalted = subprocess.run(command, env=os.environ | {"PYTHONHASHSEED": "0"}, check=True, capture_output=True)
     monkeypatch.setenv("PYTHONHASHSEED", "6640")

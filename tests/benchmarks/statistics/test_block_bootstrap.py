@@ -1,4 +1,4 @@
-"""One run: blocks as long as the errors are alike, and a label that says how far the verdict reaches."""
+"""One run: blocks as long as the errors are alike, and a label that states how far the verdict reaches."""
 
 import math
 
@@ -57,7 +57,7 @@ def test_clear_difference_is_found_and_labelled():
     assert verdict.sentence.endswith("other runs may differ)")
 
 
-def test_estimators_alike_cannot_be_told_apart():
+def test_estimators_alike_are_inconclusive():
     verdict = within_run("ekf", "particle", errors_of(1.0), "pos_p75", 0.75)
     assert verdict.winner is None
     assert verdict.sentence.startswith("within this run, inconclusive between ekf and particle on pos_p75: ratio ")

@@ -1,4 +1,4 @@
-"""Letters say exactly which names cannot be told apart."""
+"""Letters show exactly which names cannot be distinguished."""
 
 import itertools
 

@@ -43,7 +43,7 @@ def test_one_sample_leaves_everything_possible():
     assert (interval.mean, interval.low, interval.high, interval.p) == (0.3, -math.inf, math.inf, 1.0)
 
 
-def test_samples_that_agree_exactly_are_certain_of_what_they_say():
+def test_samples_that_agree_exactly_are_certain():
     assert mean_interval(np.full(4, 0.5)).p == 0.0
     assert mean_interval(np.zeros(4)).p == 1.0
 
@@ -104,7 +104,7 @@ def test_signed_ranks_with_ties_count_all_sign_patterns(differences):
     assert signed_rank(values).p == pytest.approx(np.mean([sum_ >= observed for sum_ in patterns]))
 
 
-def test_differences_of_zero_say_nothing():
+def test_differences_of_zero_count_nothing():
     assert signed_rank(np.zeros(9)) == (0.0, 1.0)
     assert signed_rank(np.append(SAMPLES, [0.0, 0.0])) == signed_rank(SAMPLES)
 

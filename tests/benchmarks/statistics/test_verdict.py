@@ -1,4 +1,4 @@
-"""A pair is judged by its runs, a lost run is never dropped, and the sentence says how sure it is."""
+"""A pair is judged by its runs, a lost run is never dropped, and the sentence states how sure that is."""
 
 import math
 
@@ -11,7 +11,7 @@ from benchmarks.statistics.verdict import by_percent, compare
 from fusion import ParameterError
 
 EASE = np.array([[1.0], [2.0], [4.0], [0.5], [3.0], [1.5], [2.5], [0.8]])
-"""How hard each of eight runs is; what it says of two estimators depends on their ratio alone."""
+"""How hard each of eight runs is; its score of two estimators depends on their ratio alone."""
 BETTER = EASE * np.exp([[-0.10], [-0.15], [-0.12], [-0.09], [-0.20], [-0.13], [-0.11], [-0.12]])
 UNSURE = EASE * np.exp([[-0.30], [0.20], [-0.10], [0.25], [-0.40], [0.10], [-0.20], [0.15]])
 
@@ -26,7 +26,7 @@ def lost(scores, *runs):
     return scores
 
 
-def test_clear_pair_is_told_with_percent_and_interval():
+def test_clear_pair_is_stated_with_percent_and_interval():
     """Mean of d -0.1275, standard deviation 0.034538; t(7, 0.975) = 2.364624, so +-0.028875."""
     verdict = verdict_of(BETTER, EASE)
     assert verdict.ratio == pytest.approx(tuple(np.exp([-0.1275, -0.1275 - 0.028875, -0.1275 + 0.028875])), rel=1e-4)
@@ -38,7 +38,7 @@ def test_winner_stands_first_whatever_the_order():
     assert verdict_of(EASE, BETTER).sentence == "particle beats ekf by 12 % [9, 14] on pos_p75 (8 runs)"
 
 
-def test_unclear_pair_says_how_many_runs_would_settle_it():
+def test_unclear_pair_states_how_many_runs_would_settle_it():
     """Mean of d -0.0375, standard deviation 0.24604: the half width is 0.2057, the detectable 0.2836, and with normal
     quantiles (1.960 + 0.842)^2 (0.24604 / 0.0375)^2 = 338 runs, a little more with those of t.
     """
@@ -89,7 +89,7 @@ def test_estimator_that_is_always_lost_is_beaten_without_any_ratio():
     )
 
 
-def test_run_that_both_lost_tells_nothing_and_leaves_the_t_interval_to_decide():
+def test_run_that_both_lost_counts_nothing_and_leaves_the_t_interval_to_decide():
     verdict = verdict_of(lost(BETTER, 3), lost(EASE, 3))
     assert (verdict.winner, verdict.by_rank, verdict.ties) == ("ekf", False, 1)
 
@@ -108,7 +108,7 @@ def test_estimator_ties_with_its_own_copy():
 
 
 def test_many_pairs_are_held_to_a_stricter_measure():
-    """t interval of the pair excludes 1, Holm over six pairs does not, and the sentence says so."""
+    """t interval of the pair excludes 1, Holm over six pairs does not, and the sentence states it."""
     slightly = EASE * np.exp([[-0.10], [0.02], [-0.15], [-0.03], [-0.20], [-0.08], [0.03], [-0.12]])
     alone = verdict_of(slightly, EASE)
     crowd = compare({"ekf": slightly, "particle": EASE, "ukf": EASE * 1.0, "grid": UNSURE}, "pos_p75")
@@ -128,7 +128,7 @@ def test_letters_and_friedman_stand_beside_the_pairs():
 
 
 @pytest.mark.parametrize(
-    ("scores", "told"),
+    ("scores", "message"),
     [
         ({"a": EASE, "b": EASE[:3]}, "different numbers of runs"),
         ({"a": EASE, "b": EASE[:, 0]}, "one row per run"),
@@ -137,8 +137,8 @@ def test_letters_and_friedman_stand_beside_the_pairs():
         ({"a": EASE, "b": -EASE}, "a score is -1.0"),
     ],
 )
-def test_scores_that_do_not_belong_together_are_refused(scores, told):
-    with pytest.raises(ParameterError, match=told):
+def test_scores_that_do_not_belong_together_are_refused(scores, message):
+    with pytest.raises(ParameterError, match=message):
         compare(scores, "pos_p75")
 
 
