@@ -70,7 +70,7 @@ class Unpacker:
         return layout.unpack_from(self._body, at)
 
     def fields(self, codes: str) -> tuple[Any, ...]:
-        """Numbers of several types, by their letters, between which no padding can be: none is larger than the one before."""
+        """Numbers of several types by their letters, none larger than the one before, so that none needs padding."""
         layout = _fields(codes)
         at = self._at + -self._at % SIZES[codes[0]]
         self._at = at + layout.size
