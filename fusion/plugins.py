@@ -44,9 +44,9 @@ class Shape(NamedTuple):
     parts: Mapping[str, type] = MappingProxyType({})
     """Attributes and their types."""
     called_with: Mapping[str, int] = MappingProxyType({})
-    """How many arguments a part takes by position, ``self`` of a method among them."""
+    """Number of arguments that a part takes by position, ``self`` of a method among them."""
     built_with: int = 0
-    """How many the plug-in itself takes by position, before its settings; 0: it is not called."""
+    """Number that the plug-in itself takes by position, before its settings; 0: it is not called."""
     named_by: str | None = None
     """The part that must be the name of the entry point."""
 
@@ -115,7 +115,7 @@ def available() -> tuple[str, ...]:
 
 
 def left_out() -> list[str]:
-    """Why `available` leaves out the other estimators, as `in_sentences`."""
+    """The reasons why `available` leaves out the other estimators, as `in_sentences`."""
     return in_sentences(_unavailable().values())
 
 

@@ -9,9 +9,10 @@ from typing import ClassVar
 import numpy as np
 
 from benchmarks.faults.fault import Fault
-from benchmarks.faults.row_selection import TOPICS, Floats, Mask, Windows
+from benchmarks.faults.row_selection import TOPICS, Windows
 from benchmarks.faults.run_columns import RunColumns
 from fusion import ParameterError
+from fusion.arrays import Flags, Floats
 from fusion.values import NANOSECONDS
 
 ALL_TOPICS = tuple(sorted(set(TOPICS.values())))
@@ -51,7 +52,7 @@ class Drop(Fault):
         rows.kept[lost] = False
 
 
-def _bad(change: Floats, p_enter: float, p_exit: float) -> Mask:
+def _bad(change: Floats, p_enter: float, p_exit: float) -> Flags:
     """True where the channel is bad, at each of (n,) uniform draws in a row."""
 
     def states() -> Iterator[bool]:

@@ -8,8 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from benchmarks.faults.fault import Fault
-from benchmarks.faults.row_selection import Floats, Mask, Windows
+from benchmarks.faults.row_selection import Windows
 from benchmarks.faults.run_columns import RunColumns
+from fusion.arrays import Flags, Floats
 
 RADIO_TOPICS = ("ranges", "wifi")
 RESOLUTIONS_DB = (1.0, 0.5, 0.1)
@@ -95,7 +96,7 @@ class Outlier(Fault):
         )
 
 
-def _write(columns: RunColumns, topic: str, changed: Mask, value: Floats) -> None:
+def _write(columns: RunColumns, topic: str, changed: Flags, value: Floats) -> None:
     """Write ``value`` where ``changed``, signal strengths in the steps of the log."""
     step_db = _resolution_db(columns) if topic == "wifi" else None
     columns.value[changed] = value[changed] if step_db is None else step_db * np.rint(value[changed] / step_db)

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fusion import Gyro, MotorCommand, Odometry, ParameterError, Ranges, WheelTicks, WifiScan
+from fusion.arrays import Flags, Floats
 from fusion.errors import nearest
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Windows = tuple[tuple[float, float], ...]
 """Stretches of time [s] from the run's start; the beginning belongs to one, the end does not."""
 
@@ -35,14 +34,14 @@ class RowSelection:
     source: NDArray[np.str_]
     elapsed_s: Floats
     """Stamp, by its own clock, from the run's start."""
-    kept: Mask
+    kept: Flags
     """False: lost; the one column that is written into."""
 
     def sources(self, topic: str) -> list[str]:
         """Sensors or anchors on ``topic``, sorted."""
         return sorted(map(str, np.unique(self.source[self.topic == topic])))
 
-    def within(self, windows: Windows | None) -> Mask:
+    def within(self, windows: Windows | None) -> Flags:
         """Rows stamped in one of ``windows``; None is always."""
         if windows is None:
             return np.ones(len(self.kept), dtype=bool)
@@ -51,7 +50,7 @@ class RowSelection:
             inside |= (begin <= self.elapsed_s) & (self.elapsed_s < end)
         return inside
 
-    def select(self, topic: str, source: str = "", windows: Windows | None = None) -> Mask:
+    def select(self, topic: str, source: str = "", windows: Windows | None = None) -> Flags:
         """Rows on ``topic``, from ``source`` ("": from all), in ``windows``; raises `ParameterError` for one that the
         run does not have.
         """

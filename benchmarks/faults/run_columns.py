@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.faults.row_selection import TOPICS, Floats, RowSelection, it_has
+from benchmarks.faults.row_selection import TOPICS, RowSelection, it_has
 from fusion import (
     Gyro,
     Measurement,
@@ -26,6 +26,7 @@ from fusion import (
     WheelTicks,
     WifiScan,
 )
+from fusion.arrays import Floats
 from fusion.odometry import wheel_increment
 from fusion.robot import WHEELS
 from fusion.timeline import order as place

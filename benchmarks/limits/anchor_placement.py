@@ -16,7 +16,6 @@ import numpy as np
 
 from benchmarks.limits.fix_bound import (
     AS_STATED,
-    Floats,
     Places,
     Shared,
     anchor_information,
@@ -24,6 +23,7 @@ from benchmarks.limits.fix_bound import (
     root_trace,
 )
 from fusion import Anchor, Bounds, World
+from fusion.arrays import Floats
 from fusion.output.progress import Progress
 from fusion.quantiles import quantile
 from fusion.radio import PathLoss, RadioKind, Ranging

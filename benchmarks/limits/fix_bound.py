@@ -18,12 +18,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fusion import Anchor, World
+from fusion.arrays import Floats
 from fusion.radio import RadioKind
-
-Floats = NDArray[np.float64]
 
 POSITION, OFFSET = slice(0, 2), 2
 """Rows and columns of an information matrix; the gain follows the offset."""

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.limits.anchor_placement import Proposal
-from benchmarks.limits.fix_bound import Floats
 from benchmarks.limits.floor_plan import Plan, title
+from fusion.arrays import Floats
 from fusion.output.figures import as_png, require_matplotlib
 from fusion.output.files import write
 

@@ -20,9 +20,10 @@ from benchmarks.limits.anchor_placement import (
     error_map,
     losses,
 )
-from benchmarks.limits.fix_bound import Floats, Shared, dilution
+from benchmarks.limits.fix_bound import Shared, dilution
 from benchmarks.limits.floor_source import choose_radio, load_site
 from fusion import Anchor, ParameterError, World, WorldError
+from fusion.arrays import Floats
 from fusion.output.progress import Progress
 from fusion.radio import RadioKind
 from fusion.trilateration import are_collinear

@@ -18,7 +18,6 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.limits.fix_bound import Floats
 from fusion import (
     Covariance,
     Estimate,
@@ -34,6 +33,7 @@ from fusion import (
     move,
     radio_readings,
 )
+from fusion.arrays import Floats
 from fusion.belief import starting_belief
 from fusion.timeline import order
 from logs.prior import starting_prior

@@ -47,13 +47,13 @@ def _se2(instants: Instants, answers: Answers) -> Pose | None:
     if not answers.valid.any():
         return None
     true = (instants.x + 1j * instants.y)[answers.valid]
-    said = (answers.x + 1j * answers.y)[answers.valid]
-    from_true, from_said = true - true.mean(), said - said.mean()
-    turn = complex(np.vdot(from_said, from_true))
-    spread = float((np.abs(from_true) ** 2 + np.abs(from_said) ** 2).sum())
+    estimated = (answers.x + 1j * answers.y)[answers.valid]
+    from_true, from_estimated = true - true.mean(), estimated - estimated.mean()
+    turn = complex(np.vdot(from_estimated, from_true))
+    spread = float((np.abs(from_true) ** 2 + np.abs(from_estimated) ** 2).sum())
     if abs(turn) <= STATIC * spread:
         return None
-    shift = complex(true.mean() - said.mean() * turn / abs(turn))
+    shift = complex(true.mean() - estimated.mean() * turn / abs(turn))
     return Pose(shift.real, shift.imag, math.atan2(turn.imag, turn.real))
 
 
@@ -64,8 +64,8 @@ def _origin(instants: Instants, answers: Answers) -> Pose | None:
         return None
     first = whole[0]
     true = Pose(float(instants.x[first]), float(instants.y[first]), float(instants.heading[first]))
-    said = Pose(float(answers.x[first]), float(answers.y[first]), float(answers.heading[first]))
-    return true.compose(said.inverse())
+    estimated = Pose(float(answers.x[first]), float(answers.y[first]), float(answers.heading[first]))
+    return true.compose(estimated.inverse())
 
 
 def _moved(answers: Answers, map_from_estimate: Pose) -> Answers:

@@ -25,7 +25,7 @@ METRICS = (
 
 
 class Claimed(NamedTuple):
-    """What is asked of the m instants with a covariance, all (m,): `Errors.nees`, its dimension, whether it is inside
+    """Columns of the m instants with a covariance, all (m,): `Errors.nees`, its dimension, whether it is inside
     the 95 % region, and the run.
     """
 

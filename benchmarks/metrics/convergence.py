@@ -98,11 +98,11 @@ def failure_metrics(measured: Errors) -> dict[str, float]:
 
 
 def fault_metrics(measured: Errors, start_ns: int, windows: Sequence[tuple[float, float]]) -> dict[str, float]:
-    """What a fault did in its ``windows`` [begin, end), seconds from ``start_ns``, of a single run.
+    """Effect of a fault in its ``windows`` [begin, end), seconds from ``start_ns``, of a single run.
 
     ``fault_availability`` is the share of the instants inside with a valid answer; NaN where instants have weights, for
-    there nothing says what was left out. ``fault_t_recover``, ``fault_max_in_outage`` and ``fault_growth`` are the
-    worst over windows of what `failure_metrics` says of failures; a window that the run does not outlast has no
+    there nothing shows what was left out. ``fault_t_recover``, ``fault_max_in_outage`` and ``fault_growth`` are the
+    worst over windows of what `failure_metrics` states of failures; a window that the run does not outlast has no
     recovery. All NaN without an instant inside.
     """
     elapsed_s = (measured.time_ns - start_ns) / NANOSECONDS
@@ -118,7 +118,7 @@ def fault_metrics(measured: Errors, start_ns: int, windows: Sequence[tuple[float
 
 
 class Outage(NamedTuple):
-    """What one failure or fault did; NaN is what cannot be said."""
+    """Effect of one failure or fault; NaN where it cannot be stated."""
 
     t_recover: float
     max_in_outage: float

@@ -1,6 +1,6 @@
 """Whether an estimator claims the errors that it really makes: a question that several seeds of one run can answer.
 
-One run tells a single error at each instant. Seeds, of a random estimator or of a random fault, tell its actual mean
+One run shows a single error at each instant. Seeds, of a random estimator or of a random fault, show its actual mean
 square there, and the claim is held against that; a method that no seed changes has nothing to be judged by.
 """
 
@@ -26,8 +26,8 @@ def credibility_metrics(runs: Sequence[Sequence[Errors]]) -> dict[str, float]:
 
     ν is the NEES by the claimed covariance, ν* that by the actual mean square error matrix over the seeds. Credible is
     0; ``incl`` above 0 is too certain, below too modest. Of k seeds an honest Gaussian claim reads about -4.3 / k dB:
-    10 / ln 10 (ψ(k / 2) - ln(k / 2)). Where some seed tells no heading, of the position alone; NaN where nothing can
-    be said: without claims, with fewer than `LEAST_SEEDS`, and of errors that no seed changes.
+    10 / ln 10 (ψ(k / 2) - ln(k / 2)). Where some seed has no heading, of the position alone; NaN where nothing can
+    be stated: without claims, with fewer than `LEAST_SEEDS`, and of errors that no seed changes.
     """
     found = [_log_ratios(seeds) for seeds in runs if len(seeds) >= LEAST_SEEDS]
     ratios = 10.0 * np.concatenate(found) if found else np.empty(0)

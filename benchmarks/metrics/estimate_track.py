@@ -1,4 +1,4 @@
-"""What an estimator said in a run, as columns: quick to score, small to store.
+"""Estimates of a run as columns: quick to score, small to store.
 
 Updates are objects, one per measurement; every metric wants arrays. They are turned over once, here.
 """
@@ -26,10 +26,10 @@ BELIEVED = (Decision.USED, Decision.DOWNWEIGHTED)
 
 
 class Track(NamedTuple):
-    """Estimates in the order they were heard, n rows.
+    """Estimates in the order of arrival, n rows.
 
     ``received_ns``: when each was there, the newest true stamp among the messages received by then, so it never
-    decreases; a message whose own clock was refused says nothing about the time. ``time_ns``: the time it is about.
+    decreases; a message whose own clock was refused states no time. ``time_ns``: the time it is about.
     ``pose`` (n, 3) [m, m, rad]. ``covariance`` (n, 6), in the order of `fusion.Covariance`, NaN where none was claimed;
     of one that was claimed and is all NaN the last number is infinite.
     ``fix_ns``: the true stamp of the radio measurement that was believed just then, or `BEFORE_ALL_NS`.
@@ -47,16 +47,16 @@ class Track(NamedTuple):
     def of(cls, updates: Sequence[Update], true_stamps: Mapping[Key, int] = MappingProxyType({})) -> Track:
         """The columns of all updates of one estimator, revisions among them; ``true_stamps`` as in `logs.run.Run`."""
         stamps = [true_stamps.get(order(update.measurement), update.measurement.time_ns) for update in updates]
-        told = list(zip(updates, stamps, strict=True))
-        clocks = [BEFORE_ALL_NS if _is_bad_clock(update) else stamp for update, stamp in told]
-        fixes = [stamp if _is_fix(update) else BEFORE_ALL_NS for update, stamp in told]
-        said = cls.of_estimates([update.estimate for update in updates])
+        stamped = list(zip(updates, stamps, strict=True))
+        clocks = [BEFORE_ALL_NS if _is_bad_clock(update) else stamp for update, stamp in stamped]
+        fixes = [stamp if _is_fix(update) else BEFORE_ALL_NS for update, stamp in stamped]
+        track = cls.of_estimates([update.estimate for update in updates])
         received = np.maximum.accumulate(np.array(clocks, dtype=np.int64))
-        return said._replace(received_ns=received, fix_ns=np.array(fixes, dtype=np.int64))
+        return track._replace(received_ns=received, fix_ns=np.array(fixes, dtype=np.int64))
 
     @classmethod
     def of_estimates(cls, estimates: Sequence[Estimate]) -> Track:
-        """Estimates alone: each was there as soon as the newest stamp before it, and nothing says what was believed."""
+        """Estimates alone: each was there as soon as the newest stamp before it, and no fix is known."""
         time_ns = np.array([estimate.time_ns for estimate in estimates], dtype=np.int64)
         return cls(
             np.maximum.accumulate(time_ns),
@@ -106,8 +106,8 @@ class Track(NamedTuple):
 
     @property
     def flaw(self) -> str:
-        """Why nothing of it can be scored: its first answer that is no number; "" where all are. What is not claimed, a
-        pose not valid or a heading not known, may be anything.
+        """The reason why nothing can be scored: the first answer that is no number; "" where all are. A pose
+        that is not valid, or a heading that is not known, may be anything.
         """
         unsound = np.flatnonzero(self.valid & ~(self._is_pose & self._is_claim))
         if len(unsound) == 0:

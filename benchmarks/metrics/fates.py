@@ -16,7 +16,7 @@ Codes = NDArray[np.int16]
 
 DECISIONS, REASONS = tuple(Decision), tuple(Reason)
 CODE = {id(member): code for members in (DECISIONS, REASONS) for code, member in enumerate(members)}
-"""Their places there. Each is one object, told by its identity: to hash it by name takes longer."""
+"""Their places there. Each is one object, known by its identity: to hash it by name takes longer."""
 KINDS = (WifiScan, Ranges, Gyro, WheelTicks, MotorCommand, Odometry)
 KIND_CODE = {kind: code for code, kind in enumerate(KINDS)}
 
@@ -56,12 +56,12 @@ class FateColumns(NamedTuple):
         decision, reason = (np.fromiter(map(CODE.__getitem__, map(id, field(fates, i))), np.int16) for i in (4, 5))
         weight, innovation, variance, nis = (np.array(list(field(fates, i)), dtype=np.float64) for i in range(6, 10))
         time_ns = np.fromiter(field(fates, 0), np.int64, len(fates))
-        kind, told = np.repeat(kinds, lengths), np.array(names, dtype=np.str_)
-        return cls(time_ns, kind, sensor, anchor, decision, reason, weight, innovation, variance, nis, told)
+        kind, named = np.repeat(kinds, lengths), np.array(names, dtype=np.str_)
+        return cls(time_ns, kind, sensor, anchor, decision, reason, weight, innovation, variance, nis, named)
 
     @property
     def source(self) -> Codes:
-        """What each reading goes by, counted into ``names``: its anchor, or the sensor of one without an anchor."""
+        """Name of each reading, counted into ``names``: its anchor, or the sensor of one without an anchor."""
         nameless = np.flatnonzero(self.names == "")
         return np.where(np.isin(self.anchor, nameless), self.sensor, self.anchor)
 
@@ -72,7 +72,7 @@ class FateColumns(NamedTuple):
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many readings met each decision."""
+        """Number of readings that met each decision."""
         found = np.bincount(self.decision, minlength=len(DECISIONS))
         return {decision.value: int(count) for decision, count in zip(DECISIONS, found, strict=True)}
 
@@ -83,5 +83,5 @@ def fates_of(updates: Sequence[Update]) -> list[Fate]:
 
 
 def fates_per_update(updates: Sequence[Update]) -> Whole:
-    """How many rows of their `FateColumns` each of ``updates`` has, (n,)."""
+    """Number of rows of their `FateColumns` that each of ``updates`` has, (n,)."""
     return np.fromiter((len(update.fates) for update in updates), np.int64, len(updates))

@@ -24,11 +24,11 @@ MOST_INSTANTS = 1_000_000
 
 
 class Answers(NamedTuple):
-    """What counts at each instant, all (n,): x, y [m], heading [rad], NaN where not known; ``covariance`` (n, 6) as
+    """Answer at each instant, all (n,): x, y [m], heading [rad], NaN where not known; ``covariance`` (n, 6) as
     in `Track`, NaN where none was claimed. ``valid`` is False, too, for what is too old.
 
     ``age_s`` is the instant minus the stamp of the newest answer, infinite before the first; ``since_fix_s`` the time
-    since the last radio measurement that was used, NaN before the first, or where nothing says what was used.
+    since the last radio measurement that was used, NaN before the first, or where nothing states what was used.
     """
 
     valid: Flags
@@ -44,13 +44,13 @@ def match(instants: Instants, track: Track, *, max_age_s: float = MAX_AGE_S) -> 
     """For each instant the newest estimate received by then, and not about a time still to come, as those that follow
     a clock that is ahead; of two with one stamp, the later received.
 
-    Valid when the estimator says so, its position is finite and ``instant - stamp <= max_age_s`` in whole nanoseconds.
+    Valid when the estimate claims so, its position is finite and ``instant - stamp <= max_age_s`` in whole nanoseconds.
     None is valid of a track with a flaw (`Track.scorable`).
     """
     track = track.scorable
-    chosen, heard = _newest(instants, track.time_ns, track.received_ns)
+    chosen, received = _newest(instants, track.time_ns, track.received_ns)
     since_fix_s = _since_fix_s(instants, track.received_ns, track.fix_ns)
-    return _answers(instants, track.at(chosen), heard, since_fix_s, max_age_s)
+    return _answers(instants, track.at(chosen), received, since_fix_s, max_age_s)
 
 
 def availability(track: Track) -> float:
@@ -73,8 +73,8 @@ def _newest(instants: Instants, stamp_ns: Whole, received_ns: Whole) -> tuple[Wh
         by_due = np.argsort(due_ns, kind="stable")
         due_ns, newest = due_ns[by_due], by_due[_record(stamp_ns[by_due])]
     due = np.searchsorted(due_ns, instants.time_ns, side="right") - 1
-    heard = due >= 0
-    return newest.take(np.maximum(due, 0)) if len(newest) else newest, heard
+    received = due >= 0
+    return newest.take(np.maximum(due, 0)) if len(newest) else newest, received
 
 
 def _record(stamps: Whole) -> Whole:
@@ -90,16 +90,16 @@ def _since_fix_s(instants: Instants, received_ns: Whole, fixes_ns: Whole) -> Flo
     return np.where(last_ns > BEFORE_ALL_NS, (instants.time_ns - last_ns) / NANOSECONDS, np.nan)
 
 
-def _answers(instants: Instants, said: Track, heard: Flags, since_fix_s: Floats, max_age_s: float) -> Answers:
-    if len(said.time_ns) == 0:
-        unknown = np.full(len(heard), np.nan)
-        no_claim = np.full((len(heard), 6), np.nan)
-        return Answers(heard & False, unknown, unknown, unknown, no_claim, np.full(len(heard), np.inf), unknown)
-    age_ns = instants.time_ns - said.time_ns
-    valid = heard & (age_ns <= nanoseconds(max_age_s)) & said.usable
-    age_s = np.where(heard, age_ns / NANOSECONDS, np.inf)
-    x, y, _ = said.pose.T
-    return Answers(valid, x, y, said.heading, said.covariance, age_s, since_fix_s)
+def _answers(instants: Instants, track: Track, received: Flags, since_fix_s: Floats, max_age_s: float) -> Answers:
+    if len(track.time_ns) == 0:
+        unknown = np.full(len(received), np.nan)
+        no_claim = np.full((len(received), 6), np.nan)
+        return Answers(received & False, unknown, unknown, unknown, no_claim, np.full(len(received), np.inf), unknown)
+    age_ns = instants.time_ns - track.time_ns
+    valid = received & (age_ns <= nanoseconds(max_age_s)) & track.usable
+    age_s = np.where(received, age_ns / NANOSECONDS, np.inf)
+    x, y, _ = track.pose.T
+    return Answers(valid, x, y, track.heading, track.covariance, age_s, since_fix_s)
 
 
 class Met(NamedTuple):
@@ -123,12 +123,12 @@ def meet(truth: TruthTrack, track: Track, *, gap_s: float = GAP_S) -> Met:
     rows = _chosen(track, known)
     instants, kept = interpolate_truth(known, track.time_ns[rows], gap_s=gap_s)
     kept &= np.count_nonzero(kept) > 1
-    said, instants = track.at(rows[kept]), instants.at(kept)
-    x, y, _ = said.pose.T
+    track, instants = track.at(rows[kept]), instants.at(kept)
+    x, y, _ = track.pose.T
     now, unknown = np.zeros(len(x)), np.full(len(x), np.nan)
     steps_s = np.minimum(np.diff(instants.time_ns), nanoseconds(gap_s)) / NANOSECONDS
     weight = 0.5 * (np.append(steps_s, 0.0) + np.insert(steps_s, 0, 0.0)) if len(now) else now
-    answers = Answers(said.usable, x, y, said.heading, said.covariance, now, unknown)
+    answers = Answers(track.usable, x, y, track.heading, track.covariance, now, unknown)
     gaps_ns = np.diff(known.time_ns)
     watched_s = float(gaps_ns[gaps_ns <= nanoseconds(gap_s)].sum()) / NANOSECONDS
     return Met(instants, answers, weight, min(float(weight.sum()) / watched_s, 1.0) if watched_s else np.nan)

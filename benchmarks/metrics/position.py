@@ -1,7 +1,7 @@
 """How far off the position and the heading were (ISO/IEC 18305, section 8), along the map's axes and the robot's.
 
 An instant without a valid answer counts as an infinite error in every quantile; means and root mean squares cover the
-valid instants only and never rank alone. ``weight`` (n,), None where all instants count alike, may tell otherwise.
+valid instants only and never rank alone. ``weight`` (n,), None where all instants count alike, states otherwise.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _within(position: Floats, ordered: Ordered, weight: Floats | None) -> dict[s
 
 
 def axis_metrics(measured: Errors) -> dict[str, float]:
-    """What depends on the map's axes: absolute errors in x and y as the paper has them, bias and covariance.
+    """Metrics along the map's axes: absolute errors in x and y as the paper has them, bias and covariance.
 
     Where errors are Gaussian and alike in all directions, a mean of ``abs_x`` is 36 % below ``pos_mean``: never compare
     one with the other.

@@ -70,7 +70,7 @@ def relative_pose_metrics(poses: Poses) -> dict[str, float]:
 
 
 class Poses(NamedTuple):
-    """What every metric of this module is computed from, (n,), the runs one after the other.
+    """Columns that every metric of this module is computed from, (n,).
 
     Points [m] are complex numbers, ``error`` the answer minus the truth; ``turn`` is the answer's heading error [rad],
     ``back`` the rotation that takes it back, ``beside`` the answer's point so rotated minus the true one; all NaN where
@@ -79,7 +79,7 @@ class Poses(NamedTuple):
 
     instants: Instants
     error: Points
-    said: Points
+    estimated: Points
     turn: Floats
     back: Points
     beside: Points
@@ -88,8 +88,8 @@ class Poses(NamedTuple):
     def of(cls, measured: Errors) -> Poses:
         """Those of all instants."""
         true, error = measured.instants.points, points(measured.dx, measured.dy)
-        said, back = true + error, _turned_by(-measured.turn)
-        return cls(measured.instants, error, said, measured.turn, back, said * back - true)
+        estimated, back = true + error, _turned_by(-measured.turn)
+        return cls(measured.instants, error, estimated, measured.turn, back, estimated * back - true)
 
 
 def _turned_by(angle: Floats) -> Points:
@@ -106,7 +106,7 @@ def relative_errors(poses: Poses, start: slice | Whole, end: slice | Whole) -> t
     Turning E by the true heading at i leaves its size: what remains is the answer's step, turned back by the heading
     error at i, minus the true step.
     """
-    moved = poses.said[end] * poses.back[start]
+    moved = poses.estimated[end] * poses.back[start]
     moved -= poses.instants.points[end]
     moved -= poses.beside[start]
     turned = np.abs(poses.turn[end] - poses.turn[start])
@@ -118,8 +118,8 @@ def velocity_metrics(poses: Poses) -> dict[str, float]:
     time_ns, (start, end) = poses.instants.time_ns, poses.instants.pairs["t_1s"]
     gained = np.abs(poses.error[end] - poses.error[start])
     speed = gained / ((time_ns[end] - time_ns[start]) / NANOSECONDS)
-    told = known(speed)
-    return {"vel_err": mean(told), "vel_err_p95": quantile(told, 0.95)}
+    speed = known(speed)
+    return {"vel_err": mean(speed), "vel_err_p95": quantile(speed, 0.95)}
 
 
 def step_metrics(poses: Poses, age_s: Floats, top_speed_m_s: float = TOP_SPEED_M_S) -> dict[str, float]:
@@ -135,8 +135,8 @@ def step_metrics(poses: Poses, age_s: Floats, top_speed_m_s: float = TOP_SPEED_M
     both = np.isfinite(step)
     jumps = both & (step > top_speed_m_s * (seconds - (known_s[1:] - known_s[:-1])) + JUMP_M)
     columns = (seconds / 60.0, step, poses.instants.step_m)
-    minutes, said_m, true_m = (float(np.add.reduce(column, where=both)) for column in columns)
+    minutes, path_m, true_m = (float(np.add.reduce(column, where=both)) for column in columns)
     return {
         "jump_rate": float(np.count_nonzero(jumps)) / minutes if minutes else math.nan,
-        "path_ratio": said_m / true_m if true_m else math.nan,
+        "path_ratio": path_m / true_m if true_m else math.nan,
     }

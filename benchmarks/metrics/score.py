@@ -52,7 +52,7 @@ __all__ = [
 
 
 def metrics(measured: Errors) -> dict[str, float]:
-    """All metrics by id, in m and rad; shares in [0, 1]. NaN where nothing can be said, infinite where most is lost."""
+    """All metrics by id, in m and rad; shares in [0, 1]. NaN where unknown, infinite where most is lost."""
     ordered, claimed = Ordered.of(measured.position, measured.weight), Claimed.of(measured)
     return {
         **_point_metrics(measured, ordered),

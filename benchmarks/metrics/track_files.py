@@ -47,7 +47,7 @@ def read_truth(source: str | Path) -> tuple[TruthTrack, tuple[str, ...]]:
 
 
 def read_track(source: str | Path) -> Track:
-    """What an estimator said, out of a TUM or CSV file, or out of a log that `fusion replay` wrote: ``run.mcap:ekf``,
+    """Estimates out of a TUM or CSV file, or out of a log that `fusion replay` wrote: ``run.mcap:ekf``,
     or ``run.mcap`` where it holds one estimator's answers only; raises `LogError`.
     """
     path, colon, name = str(source).rpartition(":")

@@ -24,7 +24,7 @@ class PairScore(NamedTuple):
     """The score of one track: ``metrics`` raw; those of position and heading ``aligned``, after ``map_from_estimate``
     moved the estimate.
 
-    The latter are None without alignment; where one was asked for and is impossible, ``align`` says so all the same.
+    The latter are None without alignment; where one was asked for and is impossible, ``align`` states so all the same.
     ``warnings``: what of the truth is left out, in sentences.
     """
 
@@ -72,16 +72,16 @@ def score_pair(
     for given, known in ((mode, MODES), (alignment, ("none", *ALIGNMENTS))):
         if given not in known:
             raise ParameterError(f"{given!r} does not exist; {did_you_mean(given, known)}")
-    (true, warnings), said = read_truth(truth), read_track(estimate)
-    if said.flaw:
-        raise LogError(f"{estimate}: {said.flaw}")
+    (true, warnings), track = read_truth(truth), read_track(estimate)
+    if track.flaw:
+        raise LogError(f"{estimate}: {track.flaw}")
     weight, availability = None, {}
     if mode == "interp":
-        instants, answers, weight, share = meet(true, said, gap_s=gap_s)
+        instants, answers, weight, share = meet(true, track, gap_s=gap_s)
         availability = {"availability": share}
     else:
         instants = evaluation_instants(true, hz=hz, gap_s=gap_s)
-        answers = match(instants, said, max_age_s=max_age_s)
+        answers = match(instants, track, max_age_s=max_age_s)
     if not answers.valid.any():
         raise LogError(f"{estimate}: {_nothing_met(true, mode, gap_s)} (truth: {truth})")
     raw = {**metrics(errors(instants, answers, weight)), **availability}
@@ -94,7 +94,7 @@ def score_pair(
 
 
 def _nothing_met(truth: TruthTrack, mode: str, gap_s: float) -> str:
-    """Why nothing could be compared, and what to do."""
+    """The reason why nothing could be compared, and the remedy."""
     if mode != "interp":
         return "no pose can be compared with the truth; see that both have the same clock"
     known = known_truth(truth)

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.metrics.score import quantile
-from benchmarks.statistics.paired_tests import LEVEL, Floats, log_ratios
+from benchmarks.statistics.paired_tests import LEVEL, log_ratios
 from benchmarks.statistics.verdict import by_percent
 from fusion import ParameterError
+from fusion.arrays import Floats
 
 RESAMPLES = 1000
 LEAST_INSTANTS = 30

@@ -15,9 +15,9 @@ from bisect import bisect_left
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from fusion.arrays import Floats
+
 Number = TypeVar("Number", float, Floats)
 
 LEVEL = 0.95

@@ -19,7 +19,6 @@ from benchmarks.statistics.letters import letters
 from benchmarks.statistics.paired_tests import (
     LEVEL,
     MAX_RUNS,
-    Floats,
     MeanInterval,
     SignedRank,
     detectable_effect,
@@ -31,6 +30,7 @@ from benchmarks.statistics.paired_tests import (
     signed_rank,
 )
 from fusion import ParameterError
+from fusion.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,7 +48,7 @@ GROUPS = {
         "score": Verb("benchmarks.cli.bench_score", "score one track against another: TUM, CSV or MCAP files"),
         "time": Verb("benchmarks.cli.bench_time", "what each estimator costs, measured alone"),
         "report": Verb("benchmarks.cli.bench_report", "the results as one HTML page"),
-        "compare": Verb("benchmarks.cli.bench_compare", "which estimator is better, or that the runs cannot tell"),
+        "compare": Verb("benchmarks.cli.bench_compare", "which estimator is better, or that the runs are inconclusive"),
         "gate": Verb("benchmarks.cli.bench_gate", "may a change land? judged against a baseline"),
         "replay": Verb("benchmarks.cli.bench_replay", "one cell again, as a log for review"),
         "verify": Verb("benchmarks.cli.bench_verify", "compute stored cells again, they must be the same"),

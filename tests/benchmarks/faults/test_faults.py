@@ -38,6 +38,7 @@ from logs.run import Run
 from logs.truth import evaluation_instants
 from sensors.simulation.scenario import load_scenario
 from sensors.simulation.simulate import simulated_run
+from tests.fusion.streams import Steps
 
 OFFICE = load_scenario("office")
 SCENARIO = replace(
@@ -609,14 +610,13 @@ def test_kidnapped_robot_measures_no_motion_and_hears_nothing(run):
     start_ns = min(getattr(m, "from_ns", m.time_ns) for m in run.measurements)
     carried = [((5.0, 9.0),), start_ns]
     faulty = with_faults(Kidnap(5.0, 9.0), run=run)
-    odometer = Odometer(run.world.robot)
-    state, moved = odometer.start(start_ns), []
+    odometer, moved = Odometer(run.world.robot, start_ns), Steps()
     for measurement in faulty.measurements:
         if isinstance(measurement, WifiScan | Ranges):
-            state, _ = odometer.hold(state, measurement.time_ns)
-            continue
-        state, steps = odometer.advance(state, measurement)
-        moved += [step for step in steps if is_in(step, *carried)]
+            odometer.hold(measurement.time_ns, Steps())
+        else:
+            odometer.advance(measurement, moved)
+    moved = [step for step in moved if is_in(step, *carried)]
     assert moved
     assert all(abs(m.distance_m) + abs(m.turn_rad) < 1e-12 for m in moved[1:])
     assert {m.rate_rad_s for m in of_kind(faulty, Gyro) if is_in(m, *carried)} == {run.world.robot.gyro_bias_rad_s}

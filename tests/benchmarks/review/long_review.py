@@ -20,7 +20,6 @@ from fusion import (
     Decision,
     Estimate,
     Fate,
-    Increment,
     Moment,
     Odometry,
     Particles,
@@ -76,7 +75,7 @@ def watched(run: Run) -> CloudWatch:
     """The clouds of an estimator that has particles."""
     watch, fold = CloudWatch(run), MadeUpFold()
     for measurement in run.measurements:
-        watch(fold, Moment(measurement, (), 0, (), Increment(), measurement.time_ns, 0))
+        watch(fold, Moment(measurement, (), 0, (), measurement.time_ns, 0, False, None, 0))
     return watch
 
 

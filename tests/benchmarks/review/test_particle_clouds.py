@@ -51,7 +51,7 @@ def test_of_a_long_run_a_bounded_number_of_clouds_is_kept(run, scans):
     radio = tuple(Ranges(1 + k, "uwb", k, ()) for k in range(scans))
     watch = CloudWatch(replace(run, measurements=radio))
     for k, measurement in enumerate(radio):
-        watch(Always(), Moment(measurement, (), k, (Epoch(1 + k, Increment(), measurement),), Increment(), 1 + k, 0))
+        watch(Always(), Moment(measurement, (), k, (Epoch(1 + k, Increment(), measurement),), 1 + k, 0, False, None, 0))
     clouds = watch.clouds()
     assert len(clouds.time_ns) == scans
     assert MOST_CLOUDS / 2 < len(clouds.cloud_ns) <= MOST_CLOUDS

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fusion import Gyro, Increment, MotorCommand, Pose, Ranges, Truth, WheelTicks, WifiScan
+from fusion.motion import Integral
 from fusion.odometry import Odometer
 from sensors.simulation.robot import SimulatedRobot
 from sensors.simulation.route import drive
@@ -48,20 +49,18 @@ def ideal(name="office", **robot):
 
 def dead_reckoned(scenario, seed=0):
     """Distance from the truth [m] at every truth of a run, from the true start on odometry alone."""
-    odometer, motion, errors = Odometer(scenario.world.robot), Increment(), []
-    state = odometer.start(0)
+    robot, errors = scenario.world.robot, []
+    odometer, motion = Odometer(robot, 0), Integral(robot.noise, Increment())
     start = Pose(*scenario.route.waypoints_m[0], drive(scenario.route)[0].pose.heading)
     for message in SimulatedRobot(scenario, seed).run():
         if isinstance(message, Truth):
-            place = start.compose(motion.pose)
+            place = start.compose(motion.increment.pose)
             errors.append(math.dist((place.x, place.y), (message.x, message.y)))
             continue
         if isinstance(message, WifiScan | Ranges):
-            state, steps = odometer.hold(state, message.time_ns)
+            odometer.hold(message.time_ns, motion.extend)
         else:
-            state, steps = odometer.advance(state, message)
-        for odometry in steps:
-            motion = motion.extend(odometry, scenario.world.robot.noise)
+            odometer.advance(message, motion.extend)
     return np.array(errors)
 
 
