@@ -34,6 +34,7 @@ VERBS = {
     "calibrate": Verb("sensors.cli.calibrate", "the numbers of radio, wheels and gyro from recorded runs"),
     "bound": Verb("benchmarks.cli.bound", "the least error a fix can have over a floor, and where an anchor helps"),
     "bench": Verb("benchmarks.cli.bench", "score estimators on recorded runs"),
+    "perf": Verb("benchmarks.cli.perf", "how fast the estimators are beside filterpy, and by which laws cost grows"),
     "replay": Verb("benchmarks.cli.replay", "run one estimator over a log and record its estimates"),
     "review": Verb("benchmarks.cli.review", "see a run and its estimators in Rerun"),
     "reproduce": Verb("benchmarks.cli.reproduce", "the paper's experiments run again, and its claims judged"),

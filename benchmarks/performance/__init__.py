@@ -1,0 +1,1 @@
+"""The speed of the estimators beside other libraries, and the laws by which cost grows."""
