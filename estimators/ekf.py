@@ -14,6 +14,8 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
+import numpy as np
+
 from fusion import (
     Covariance,
     Decision,
@@ -40,7 +42,8 @@ from fusion.radio import PathLoss, Ranging
 
 POSE = 3
 """States of the pose, which come first; then those of the odometry's calibration."""
-UNCALIBRATED = (0.0, 0.0, 0.0)
+LONG = 6
+"""Readings of a scan beyond which arrays are faster than lists."""
 
 Row = list[float]
 
@@ -307,7 +310,10 @@ def _gain(
 
 
 def _less(rows: list[Row], gains: Sequence[Row]) -> list[Row]:
-    """P - Σ g gᵀ, three gains at a time."""
+    """P - Σ g gᵀ: three gains at a time, or by linear algebra where many anchors make both long."""
+    if len(gains) > LONG:
+        columns = np.array(gains)
+        return (np.array(rows) - columns.T @ columns).tolist()  # type: ignore[no-any-return]
     for first in range(0, len(gains), 3):
         one, two, three = (*gains[first : first + 3], *[[0.0] * len(rows)] * 2)[:3]
         rows = [
