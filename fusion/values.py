@@ -85,6 +85,11 @@ class RssiReading(NamedTuple):
     rssi_dbm: float
     age_ns: int = 0
 
+    @property
+    def value(self) -> float:
+        """The number that was measured [dBm]."""
+        return self.rssi_dbm
+
 
 @dataclass(frozen=True, slots=True)
 class WifiScan:
@@ -102,6 +107,11 @@ class RangeReading(NamedTuple):
     anchor: str
     range_m: float
     std_m: float | None = None
+
+    @property
+    def value(self) -> float:
+        """The number that was measured [m]."""
+        return self.range_m
 
 
 @dataclass(frozen=True, slots=True)

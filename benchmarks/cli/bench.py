@@ -8,7 +8,7 @@ from pathlib import Path
 
 from benchmarks.metrics.families import families
 from benchmarks.runner.adhoc_suite import bench, remarks, tables, write_records
-from fusion.cli.arguments import at_least_one, not_negative
+from fusion.cli.arguments import at_least_one, estimator_options, not_negative
 from fusion.cli.options import parse_settings
 from fusion.output.progress import progress_bar
 from fusion.output.tables import print_tables
@@ -18,10 +18,7 @@ from fusion.plugins import left_out
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion bench``."""
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="MCAP logs")
-    parser.add_argument("--estimators", metavar="A,B", help="names, separated by commas; all installed by default")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="NAME.KEY=VALUE", help="a parameter of an estimator; repeatable"
-    )
+    estimator_options(parser)
     parser.add_argument("--json", type=Path, metavar="OUT", help="write one record per run and estimator; - for stdout")
     parser.add_argument("--seed", type=not_negative, default=0, help="of the estimators that draw random numbers")
     parser.add_argument("--workers", type=at_least_one, metavar="N", help="processes; one per core by default")

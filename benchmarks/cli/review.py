@@ -16,7 +16,7 @@ from benchmarks.review.window import serve_web
 from benchmarks.runner.run_source import open_run
 from benchmarks.runner.suite_file import load_suite
 from fusion import ParameterError
-from fusion.cli.arguments import at_least_one, not_negative, since_start
+from fusion.cli.arguments import at_least_one, estimator_options, not_negative, since_start
 from fusion.cli.options import parse_settings
 from fusion.plugins import left_out
 from logs.cli.import_ import bag_options, given_options
@@ -27,10 +27,7 @@ from logs.run import Run
 def configure(parser: argparse.ArgumentParser) -> None:
     """The options of ``fusion review``."""
     subject_options(parser)
-    parser.add_argument("--estimators", metavar="A,B", help="names, separated by commas; all installed by default")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="NAME.KEY=VALUE", help="a parameter of an estimator; repeatable"
-    )
+    estimator_options(parser)
     parser.add_argument(
         "--save", type=Path, metavar="OUT", help="write OUT.rrd for the Rerun viewer, or a folder of one file a layer"
     )

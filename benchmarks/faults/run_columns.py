@@ -62,7 +62,7 @@ class RunColumns:
             for reading in m.readings
         ]
         self.owner = np.array([i for i, _, _ in radio], dtype=np.int64)
-        self.value = np.array([_value(reading) for _, _, reading in radio], dtype=np.float64)
+        self.value = np.array([reading.value for _, _, reading in radio], dtype=np.float64)
         self.recorded_value = self.value.copy()
         self.readings = self._rows([TOPICS[type(m)] for _, m, _ in radio], [r.anchor for _, _, r in radio], self.owner)
 
@@ -154,12 +154,8 @@ class RunColumns:
         return replace(odometry, distance_m=distance_m, turn_rad=turn_rad)
 
 
-def _value(reading: RssiReading | RangeReading) -> float:
-    return reading.rssi_dbm if isinstance(reading, RssiReading) else reading.range_m
-
-
 def _with_value(reading: RssiReading | RangeReading, value: float) -> RssiReading | RangeReading:
-    if value == _value(reading) or math.isnan(value):
+    if value == reading.value or math.isnan(value):
         return reading
     if isinstance(reading, RssiReading):
         return reading._replace(rssi_dbm=value)

@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from fusion import Fate, Measurement, RangeReading, Ranges, RssiReading, WifiScan, World
+from fusion import Fate, Measurement, RangeReading, Ranges, WifiScan, World
 from fusion.arrays import Floats, Stamps
 
 Identity: TypeAlias = tuple[int, str, int, str]
@@ -39,7 +39,7 @@ class ReadingColumns(NamedTuple):
         time_ns = np.array([entry[0] for entry in identity], dtype=np.int64)
         anchor = np.array([entry[3] for entry in identity], dtype=np.str_)
         is_range = np.array([isinstance(reading, RangeReading) for _, reading in pairs], dtype=np.bool_)
-        value = np.array([_value(reading) for _, reading in pairs], dtype=np.float64)
+        value = np.array([reading.value for _, reading in pairs], dtype=np.float64)
         radius_m = _radii(world, anchor, is_range, value)
         return cls(time_ns, anchor, is_range, value, dict(zip(identity, radius_m.tolist(), strict=True)))
 
@@ -47,10 +47,6 @@ class ReadingColumns(NamedTuple):
         """The radius [m] of the reading of each of ``fates`` (m,); NaN for a reading that makes no circle."""
         radius_m = map(self.radius_of.get, map(itemgetter(slice(4)), fates), repeat(math.nan))
         return np.fromiter(radius_m, np.float64, len(fates))
-
-
-def _value(reading: RssiReading | RangeReading) -> float:
-    return reading.range_m if isinstance(reading, RangeReading) else reading.rssi_dbm
 
 
 def _radii(world: World, anchors: NDArray[np.str_], is_range: NDArray[np.bool_], value: Floats) -> Floats:

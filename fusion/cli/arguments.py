@@ -20,6 +20,14 @@ def not_negative(text: str) -> int:
     return int(text)
 
 
+def estimator_options(parser: argparse.ArgumentParser) -> None:
+    """Options of a verb that takes several estimators, for `fusion.cli.options.parse_settings`."""
+    parser.add_argument("--estimators", metavar="A,B", help="names, separated by commas; all installed by default")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME.KEY=VALUE", help="a parameter of an estimator; repeatable"
+    )
+
+
 def since_start(text: str) -> float:
     """A time [s] after a run's start, from a command line."""
     try:

@@ -138,12 +138,11 @@ def _rows(
         return
     poses, known = where(np.array(taken, dtype=np.int64))
     for i, (_, reading) in enumerate(readings):
-        value = reading.rssi_dbm if isinstance(reading, RssiReading) else reading.range_m
-        if known[i] and math.isfinite(value):
+        if known[i] and math.isfinite(reading.value):
             anchor = world.anchors[index[reading.anchor]]
             x, y = float(poses.x[i]), float(poses.y[i])
             away = distance_m(Pose(x, y, float(poses.heading[i])), anchor, world.robot.antenna_m)
-            yield index[anchor.id], value, away, float(anchor.model(kind).by_gain(away)), x, y
+            yield index[anchor.id], reading.value, away, float(anchor.model(kind).by_gain(away)), x, y
 
 
 def distance_m(base: Pose, anchor: Anchor, antenna_m: tuple[float, float, float]) -> float:
