@@ -14,8 +14,6 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
-import numpy as np
-
 from fusion import (
     Covariance,
     Decision,
@@ -38,14 +36,11 @@ from fusion import (
 from fusion.belief import HEADING_KNOWN_STD, starting_belief
 from fusion.correlated_error import correlated_count_of, require_max_correlated
 from fusion.fates import chi_square_gate
+from fusion.plain_covariance import Row, scaled_gain, shared_with, with_states, without
 from fusion.radio import PathLoss, Ranging
 
 POSE = 3
 """States of the pose, which come first; then those of the odometry's calibration."""
-LONG = 6
-"""Readings of a scan beyond which arrays are faster than lists."""
-
-Row = list[float]
 
 
 class State(NamedTuple):
@@ -136,7 +131,7 @@ class Ekf:
     def start(self, prior: Prior, seed: int) -> State:  # noqa: ARG002 - nothing here is random
         """The prior, with every calibration error at zero."""
         pose, covariance = starting_belief(self._world, prior)
-        mean, rows = _with_states(list(pose), [list(row) for row in covariance.matrix], self._variances)
+        mean, rows = with_states(list(pose), [list(row) for row in covariance.matrix], self._variances)
         return State(mean, rows, 0.0, ())
 
     def step(self, state: State, motion: Increment, scan: Radio | None) -> tuple[State, tuple[Fate, ...]]:
@@ -151,8 +146,7 @@ class Ekf:
         covariance = Covariance(xx, xy, xh, yy, yh, hh)
         if motion.duration_s > 0.0:
             step = self._move(state.mean, motion)
-            size = 2 * POSE if self._calibrated else POSE
-            covariance = self._corner(self._top(step, [row[:size] for row in state.covariance[:size]]), step)
+            covariance = self._corner(step, state.covariance)
             x, y, heading = x + step.dx, y + step.dy, wrap_angle(heading + step.turn)
         known = covariance.hh < HEADING_KNOWN_STD**2
         return Estimate(time_ns, Pose(x, y, heading), covariance, True, known)
@@ -160,45 +154,62 @@ class Ekf:
     def _move(self, mean: Row, motion: Increment) -> Move:
         return move(mean[2], motion, *mean[POSE : 2 * POSE]) if self._calibrated else move(mean[2], motion)
 
-    def _top(self, step: Move, rows: Sequence[Row]) -> tuple[Row, Row, Row]:
-        """F P for the rows of the pose: its Jacobian by the pose and by the errors of the odometry times ``rows``."""
-        dx, dy = step.dx, step.dy
+    def _corner(self, step: Move, rows: Sequence[Row]) -> Covariance:
+        """F P Fᵀ + Q for the pose, of which F has the Jacobian by pose and odometry's errors: (3, 6), or (3, 3)."""
+        dx, dy, noise = step.dx, step.dy, step.noise
         if not self._calibrated:
-            first, second, third = rows[:POSE]
+            xx, xy, xh = rows[0][:POSE]
+            yy, yh, hh = rows[1][1], rows[1][2], rows[2][2]
+            x_h, y_h = xh - dy * hh, yh + dx * hh
+            return Covariance(
+                xx - dy * (xh + x_h) + noise.xx,
+                xy + dx * xh - dy * y_h + noise.xy,
+                x_h + noise.xh,
+                yy + dx * (yh + y_h) + noise.yy,
+                y_h + noise.yh,
+                hh + noise.hh,
+            )
+        (a, b, c), (d, e, f), (_, g, k) = step.x_by_errors, step.y_by_errors, step.turn_by_errors
+        # The errors: s of distance, t of turn, r of the rate; x_h is the covariance of the new x with the old heading.
+        xx, xy, xh, xs, xt, xr = rows[0][:6]
+        _, yy, yh, ys, yt, yr = rows[1][:6]
+        hh, hs, ht, hr = rows[2][2:6]
+        ss, st, sr = rows[3][3:6]
+        tt, tr, rr = rows[4][4], rows[4][5], rows[5][5]
+        x_h = xh - dy * hh + a * hs + b * ht + c * hr
+        x_s = xs - dy * hs + a * ss + b * st + c * sr
+        x_t = xt - dy * ht + a * st + b * tt + c * tr
+        x_r = xr - dy * hr + a * sr + b * tr + c * rr
+        y_h = yh + dx * hh + d * hs + e * ht + f * hr
+        y_s = ys + dx * hs + d * ss + e * st + f * sr
+        y_t = yt + dx * ht + d * st + e * tt + f * tr
+        y_r = yr + dx * hr + d * sr + e * tr + f * rr
+        h_t, h_r = ht + g * tt + k * tr, hr + g * tr + k * rr
+        return Covariance(
+            xx - dy * (xh + x_h) + a * (xs + x_s) + b * (xt + x_t) + c * (xr + x_r) + noise.xx,
+            xy - dy * yh + a * ys + b * yt + c * yr + dx * x_h + d * x_s + e * x_t + f * x_r + noise.xy,
+            x_h + g * x_t + k * x_r + noise.xh,
+            yy + dx * (yh + y_h) + d * (ys + y_s) + e * (yt + y_t) + f * (yr + y_r) + noise.yy,
+            y_h + g * y_t + k * y_r + noise.yh,
+            hh + g * (ht + h_t) + k * (hr + h_r) + noise.hh,
+        )
+
+    def _across(self, step: Move, rows: Sequence[Row]) -> tuple[Row, Row, Row]:
+        """F P for the pose, with all states but the pose."""
+        dx, dy = step.dx, step.dy
+        first, second, third = (row[POSE:] for row in rows[:POSE])
+        if not self._calibrated:
             return (
                 [x - dy * h for x, h in zip(first, third)],
                 [y + dx * h for y, h in zip(second, third)],
                 third,
             )
         (a, b, c), (d, e, f), (_, g, k) = step.x_by_errors, step.y_by_errors, step.turn_by_errors
-        first, second, third, *errors = rows[: 2 * POSE]
+        errors = [row[POSE:] for row in rows[POSE : 2 * POSE]]
         return (
-            [x - dy * h + a * s + b * t + c * u for x, h, s, t, u in zip(first, third, *errors)],
-            [y + dx * h + d * s + e * t + f * u for y, h, s, t, u in zip(second, third, *errors)],
-            [h + g * t + k * u for h, t, u in zip(third, *errors[1:])],
-        )
-
-    def _corner(self, top: tuple[Row, Row, Row], step: Move) -> Covariance:
-        """F P Fᵀ + Q for the pose, from its rows of F P."""
-        by_x, by_y, by_h = top
-        dx, dy, noise = step.dx, step.dy, step.noise
-        if not self._calibrated:
-            return Covariance(
-                by_x[0] - dy * by_x[2] + noise.xx,
-                by_x[1] + dx * by_x[2] + noise.xy,
-                by_x[2] + noise.xh,
-                by_y[1] + dx * by_y[2] + noise.yy,
-                by_y[2] + noise.yh,
-                by_h[2] + noise.hh,
-            )
-        (a, b, c), (d, e, f), (_, g, k) = step.x_by_errors, step.y_by_errors, step.turn_by_errors
-        return Covariance(
-            by_x[0] - dy * by_x[2] + a * by_x[3] + b * by_x[4] + c * by_x[5] + noise.xx,
-            by_x[1] + dx * by_x[2] + d * by_x[3] + e * by_x[4] + f * by_x[5] + noise.xy,
-            by_x[2] + g * by_x[4] + k * by_x[5] + noise.xh,
-            by_y[1] + dx * by_y[2] + d * by_y[3] + e * by_y[4] + f * by_y[5] + noise.yy,
-            by_y[2] + g * by_y[4] + k * by_y[5] + noise.yh,
-            by_h[2] + g * by_h[4] + k * by_h[5] + noise.hh,
+            [x - dy * h + a * s + b * t + c * r for x, h, s, t, r in zip(first, third, *errors)],
+            [y + dx * h + d * s + e * t + f * r for y, h, s, t, r in zip(second, third, *errors)],
+            [h + g * t + k * r for h, t, r in zip(third, *errors[1:])],
         )
 
     def _moved(self, state: State, motion: Increment) -> State:
@@ -212,12 +223,11 @@ class Ekf:
         kept = [1.0] * (len(state.mean) - POSE - len(errors)) + fading
         x, y, heading, *rest = state.mean
         step = self._move(state.mean, motion)
-        top = self._top(step, state.covariance)
-        across = [[p * k for p, k in zip(row[POSE:], kept)] for row in top]
+        across = [[p * k for p, k in zip(row, kept)] for row in self._across(step, state.covariance)]
         below = [[p * (own * k) for p, k in zip(row[POSE:], kept)] for own, row in zip(kept, state.covariance[POSE:])]
         for i, (own, error) in enumerate(zip(fading, errors), start=len(kept) - len(errors)):
             below[i][i] += (1.0 - own * own) * error.variance
-        corner = self._corner(top, step).matrix
+        corner = self._corner(step, state.covariance).matrix
         rows = [[*own, *row] for own, row in zip(corner, across)]
         rows += [[*column, *row] for column, row in zip(zip(*across), below)]
         mean = [x + step.dx, y + step.dy, wrap_angle(heading + step.turn), *(m * k for m, k in zip(rest, kept))]
@@ -230,20 +240,20 @@ class Ekf:
         mean, gains, fates = before.mean, list[Row](), []
         for reading in readings:
             innovation, jacobian, variance = self._linearise(reading, before, places)
-            shared = _shared(before.covariance, jacobian)
+            shared = shared_with(before.covariance, jacobian)
             spread = variance + sum(by * shared[i] for i, by in jacobian.items())
             nis = innovation * innovation / spread
             used = nis <= self._gate
             if used:
                 remaining = innovation - sum(by * (mean[i] - before.mean[i]) for i, by in jacobian.items())
-                gain, step = _gain(shared, jacobian, gains, variance, remaining)
+                gain, step = scaled_gain(shared, jacobian, gains, variance, remaining)
                 gains.append(gain)
                 mean = [m + step * g for m, g in zip(mean, gain)]
             verdict = (Decision.USED, Reason.OK, 1.0) if used else (Decision.REJECTED, Reason.GATE, 0.0)
             who = (scan.time_ns, scan.sensor, scan.seq, reading.anchor.id)
             fates.append(Fate(*who, *verdict, innovation, spread, nis))
         x, y, heading, *rest = mean
-        rows = _less(before.covariance, gains)
+        rows = without(before.covariance, gains)
         return State([x, y, wrap_angle(heading), *rest], rows, 0.0, before.anchors), tuple(fates)
 
     def _with_anchors(self, state: State, readings: Sequence[RadioReading]) -> State:
@@ -252,7 +262,7 @@ class Ekf:
         new = tuple(one for one in received if one in self._anchor_errors and one not in state.anchors)
         if not new:
             return state
-        mean, rows = _with_states(state.mean, state.covariance, [self._anchor_errors[one].variance for one in new])
+        mean, rows = with_states(state.mean, state.covariance, [self._anchor_errors[one].variance for one in new])
         return State(mean, rows, state.path_m, state.anchors + new)
 
     def _linearise(
@@ -273,51 +283,3 @@ class Ekf:
             return innovation, jacobian, variance + times * reading.model.bias_std**2
         jacobian[place] = 1.0
         return innovation - state.mean[place], jacobian, variance
-
-
-def _with_states(mean: Row, rows: list[Row], variances: Sequence[float]) -> tuple[Row, list[Row]]:
-    """Further states of mean zero, each independent of all others."""
-    count, more = len(mean), len(variances)
-    wider = [[*row, *[0.0] * more] for row in rows]
-    for i, variance in enumerate(variances):
-        wider.append([0.0] * (count + more))
-        wider[-1][count + i] = variance
-    return [*mean, *[0.0] * more], wider
-
-
-def _shared(rows: Sequence[Row], jacobian: dict[int, float]) -> Row:
-    """P Hᵀ, the covariance of the states with what one reading shows."""
-    (i, by), *others = jacobian.items()
-    shared = [by * p for p in rows[i]]
-    for i, by in others:
-        shared = [s + by * p for s, p in zip(shared, rows[i])]
-    return shared
-
-
-def _gain(
-    shared: Row, jacobian: dict[int, float], gains: Sequence[Row], variance: float, innovation: float
-) -> tuple[Row, float]:
-    """The gain of one scalar reading over the root of its innovation's variance, and the innovation over that root.
-
-    P after the readings before is P - Σ g gᵀ of their ``gains``, so P Hᵀ is ``shared`` - Σ g (H g): the covariance is
-    written once a scan only, and stays symmetric to the last bit (Potter's form: Bierman 1977, section II.3).
-    """
-    for gain in gains:
-        part = sum(by * gain[i] for i, by in jacobian.items())
-        shared = [s - part * g for s, g in zip(shared, gain)]
-    root = 1.0 / math.sqrt(variance + sum(by * shared[i] for i, by in jacobian.items()))
-    return [s * root for s in shared], innovation * root
-
-
-def _less(rows: list[Row], gains: Sequence[Row]) -> list[Row]:
-    """P - Σ g gᵀ: three gains at a time, or by linear algebra where many anchors make both long."""
-    if len(gains) > LONG:
-        columns = np.array(gains)
-        return (np.array(rows) - columns.T @ columns).tolist()  # type: ignore[no-any-return]
-    for first in range(0, len(gains), 3):
-        one, two, three = (*gains[first : first + 3], *[[0.0] * len(rows)] * 2)[:3]
-        rows = [
-            [p - a * x - b * y - c * z for p, x, y, z in zip(row, one, two, three)]
-            for row, a, b, c in zip(rows, one, two, three)
-        ]
-    return rows
