@@ -12,6 +12,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
+from fusion.collection import collect_seldom
+
 OUT_OF_MEMORY = 77
 """Exit code of a worker whose task took more memory than it may."""
 WATCH_S = 0.05
@@ -33,6 +35,7 @@ class Answer(NamedTuple):
 def serve(connection: Connection, work: Callable[[Any], Any], rss_mb: float | None, idle_s: float | None) -> None:
     """The life of a worker: report that it is ready, then answer task after task until nobody asks any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    collect_seldom()
     threading.Thread(target=_watch_parent, daemon=True).start()
     if rss_mb is not None:
         threading.Thread(target=_watch_memory, args=(rss_mb,), daemon=True).start()

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from fusion.cli.verbs import GROUPS, VERBS, Verb, implementation, plugin_verbs, refused_verbs
+from fusion.collection import collect_seldom
 from fusion.errors import FusionError, PluginError, did_you_mean
 
 
@@ -54,6 +55,7 @@ def _usage() -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command line; answers its exit code."""
+    collect_seldom()
     words = list(sys.argv[1:] if arguments is None else arguments)
     if not words or words[0] in ("-h", "--help"):
         sys.stdout.write(_usage())
