@@ -142,9 +142,10 @@ class Ekf:
     def estimate(self, state: State, motion: Increment, time_ns: int) -> Estimate:
         """The pose after the motion since; nothing but pose and calibration moves it."""
         x, y, heading, *_ = state.mean
-        (xx, xy, xh, *_), (_, yy, yh, *_), (_, _, hh, *_), *_ = state.covariance
-        covariance = Covariance(xx, xy, xh, yy, yh, hh)
-        if motion.duration_s > 0.0:
+        if motion.duration_s == 0.0:
+            (xx, xy, xh, *_), (_, yy, yh, *_), (_, _, hh, *_), *_ = state.covariance
+            covariance = Covariance(xx, xy, xh, yy, yh, hh)
+        else:
             step = self._move(state.mean, motion)
             covariance = self._corner(step, state.covariance)
             x, y, heading = x + step.dx, y + step.dy, wrap_angle(heading + step.turn)

@@ -78,6 +78,7 @@ class Moment:
     """
 
     __slots__ = (
+        "_motion",
         "_place",
         "_stretch",
         "epochs",
@@ -110,6 +111,7 @@ class Moment:
         self.revised = revised
         self._stretch = stretch
         self._place = place
+        self._motion: Increment | None = None
 
     def __repr__(self) -> str:
         """All that it holds, its motion among it."""
@@ -118,8 +120,10 @@ class Moment:
 
     @property
     def motion(self) -> Increment:
-        """The motion since the last epoch up to ``time_ns``, computed when it is asked for."""
-        return self._stretch.motion_after(self._place)
+        """The motion since the last epoch up to ``time_ns``, computed when first asked for: at once it costs least."""
+        if self._motion is None:
+            self._motion = self._stretch.motion_after(self._place)
+        return self._motion
 
 
 class Timeline:

@@ -1,4 +1,4 @@
-"""What is left of the errors when the estimate may be moved onto the truth: never without saying by how much.
+"""Errors that are left when the estimate may be moved onto the truth: never without saying by how much.
 
 Alignment hides the error of absolute localization, so the raw score is the headline, and an aligned one stands beside
 its transform and the ratio of both. Consistency is judged on raw estimates only: alignment would move covariances too.

@@ -1,4 +1,4 @@
-"""How the answers came and went: convergence, failures and recovery, silence, where on the floor there were any.
+"""Course of the answers: convergence, failures and recovery, silence, where on the floor there were any.
 
 A stretch of instants lasts from its first to its last one.
 """

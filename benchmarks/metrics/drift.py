@@ -1,4 +1,4 @@
-"""How fast errors grow while nothing corrects them."""
+"""Growth of errors while nothing corrects them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much evidence a series of correlated values is, and the intervals that follow from it.
+"""Evidence in a series of correlated values, and the intervals that follow from it.
 
 Errors a tenth of a second apart are nearly the same error: taken as independent they make any filter look
 significantly inconsistent. So every interval here counts the effective number of samples instead.

@@ -1,4 +1,4 @@
-"""What became of the readings of a run, as columns: millions of small values are turned over once, never row by row."""
+"""Fates of the readings of a run, as columns: millions of small values are turned over once, never row by row."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How sure the figures of one run are: 95 % intervals of position quantiles and coverage, and the band of ANEES.
+"""Certainty of the figures of one run: 95 % intervals of position quantiles and coverage, and the band of ANEES.
 
 All of them need effective sample sizes, and the transforms behind those cost more than all else; they are made at once.
 """

@@ -1,4 +1,4 @@
-"""How far off the position and the heading were (ISO/IEC 18305, section 8), along the map's axes and the robot's.
+"""Errors of position and heading (ISO/IEC 18305, section 8), along the map's axes and the robot's.
 
 An instant without a valid answer counts as an infinite error in every quantile; means and root mean squares cover the
 valid instants only and never rank alone. ``weight`` (n,), None where all instants count alike, states otherwise.

@@ -1,4 +1,4 @@
-"""What each answer claimed, as a Gaussian, against what was true: NEES and the proper scores, instant by instant."""
+"""Claim of each answer, as a Gaussian, against the truth: NEES and the proper scores, instant by instant."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DIRECTIONS = 8
 """Of the energy score: a mean over instants is then right to 0.2 %, of hopeless claims to 0.6 %."""
 ANGLES = (np.arange(DIRECTIONS)[:, None] + 0.5) * (np.pi / DIRECTIONS)
 REACH = np.abs(np.cos(ANGLES)).astype(np.float32)
-"""How much of the error lies in each direction, (directions, 1). Single precision is ample here, and twice as fast."""
+"""Share of the error in each direction, (directions, 1). Single precision is ample here, and twice as fast."""
 HARMONICS = np.hstack([np.ones_like(ANGLES), np.cos(2.0 * ANGLES), -np.sin(2.0 * ANGLES)]).astype(np.float32)
 """A variance in each direction from its mean and its second harmonic, (directions, 3)."""
 ALL_REACH = float(np.abs(np.cos(ANGLES)).sum())

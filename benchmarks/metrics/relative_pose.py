@@ -1,4 +1,4 @@
-"""How well the answers follow the truth from one time to a later one: relative pose errors, speed, jumps, length."""
+"""Agreement of answers and truth from one time to a later one: relative pose errors, speed, jumps, length."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fusion.values import NANOSECONDS
 from logs.truth import DISTANCES_M, DURATIONS_S, Instants
 
 TOP_SPEED_M_S = 2.0
-"""What no indoor robot exceeds, where none is declared."""
+"""Speed that no indoor robot exceeds, where none is declared."""
 JUMP_M = 0.10
 REACHES = (*(f"d_{reach}m" for reach in DISTANCES_M), *(f"t_{reach}s" for reach in DURATIONS_S))
 METRICS = (

@@ -1,4 +1,4 @@
-"""How good the answers were: all metrics by id, each a pure function of arrays, in metres, seconds and radians.
+"""Quality of the answers: all metrics by id, each a pure function of arrays, in metres, seconds and radians.
 
 Coverage is part of the score. An instant without a valid answer counts as an infinite error in every quantile;
 means and root mean squares cover the valid instants only and never rank alone. Nothing is aligned.

@@ -1,4 +1,4 @@
-"""How good a track in one file is against the truth in another."""
+"""Score of a track in one file against the truth in another."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ def late(driven: Drive, steps: int) -> list[Measurement]:
 
 
 def refold_rows(steps: int = 150) -> list[Row]:
-    """How often the ekf steps when one scan arrives late, all others in time: once for itself, the rest again."""
+    """Number of steps of the ekf when one scan arrives late, all others in time: once for itself, the rest again."""
     driven = drive(LIVE_S, site())
     counted = CountedSteps(fusion.build(EKF.estimator, driven.world))
     tracker = Tracker(counted, driven.world, driven.prior)

@@ -21,7 +21,7 @@ Count = Callable[[Callable[[], object]], int]
 
 
 def calls(work: Callable[[], object]) -> int:
-    """How many functions ``work`` calls, of Python or of C."""
+    """Number of functions that ``work`` calls, of Python or of C."""
     count = 0
 
     def profile(_frame: FrameType, event: str, _argument: object) -> None:
@@ -38,7 +38,7 @@ def calls(work: Callable[[], object]) -> int:
 
 
 def instructions(work: Callable[[], object]) -> int:
-    """How many instructions of Python's own machine ``work`` takes: loops within a function show here."""
+    """Number of instructions of Python's own machine that ``work`` takes: loops within a function show here."""
     count = 0
 
     def trace(frame: FrameType, event: str, _argument: object) -> Any:  # noqa: ANN401 - a trace answers itself

@@ -38,7 +38,7 @@ PACKAGES = ("fusion-localization", "scipy", "mcap", "filterpy")
 
 
 class Performance(NamedTuple):
-    """What was measured, on which machine; ``missing`` is a sentence where there is nothing to compare with."""
+    """Figures, and the machine they are of; ``missing`` is a sentence where there is nothing to compare with."""
 
     conditions: dict[str, str]
     answers: tuple[Answer, ...]
@@ -109,7 +109,7 @@ def answers(subjects: Sequence[Subject], beside: References | None, seconds: flo
 
 
 def conditions(minutes: float, rounds: int) -> dict[str, str]:
-    """What the figures are true of: the log, the machine, the versions, the day."""
+    """Conditions of the figures: the log, the machine, the versions, the day."""
     about = {"log": f"{minutes:g} minutes", "rounds": str(rounds), "date": time.strftime("%Y-%m-%d")}
     versions = {name: installed for name in PACKAGES if (installed := _version(name)) is not None}
     return {**about, **machine(), **_processor(), **versions}

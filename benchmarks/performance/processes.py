@@ -94,7 +94,7 @@ def _children_s() -> float:
 
 
 def _output(command: list[str]) -> str:
-    """What a process writes; raises `FusionError` where it fails."""
+    """Standard output of a process; raises `FusionError` where it fails."""
     ended = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own command
     if ended.returncode:
         raise FusionError(f"{' '.join(command[:4])} ... failed: {ended.stderr.strip().splitlines()[-1:]}")

@@ -45,7 +45,7 @@ class Row(NamedTuple):
 
     @property
     def floor(self) -> Floor | None:
-        """What is asked of it, None where nothing is."""
+        """The bound that it must hold, None where there is none."""
         return FLOORS.get((self.quantity, self.subject))
 
     @property

@@ -55,8 +55,12 @@ class EstimatorRun:
 @lru_cache(maxsize=2)
 def run_moments(run: Run) -> tuple[Moment, ...]:
     """The run as the host sees it, moment by moment: screened, in order, motion integrated once for every estimator."""
-    timeline = Timeline(run.world, starting_prior(run).time_ns)
-    return tuple(moment for measurement in run.measurements for moment in timeline.push(measurement))
+    timeline, moments = Timeline(run.world, starting_prior(run).time_ns), list[Moment]()
+    for measurement in run.measurements:
+        for moment in timeline.push(measurement):
+            moment.motion  # noqa: B018 - asked for later, it would be integrated once more
+            moments.append(moment)
+    return tuple(moments)
 
 
 def run_estimator(
